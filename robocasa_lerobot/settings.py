@@ -34,6 +34,23 @@ _Loader.add_implicit_resolver(
 )
 
 
+class _Typed(_Loader):
+    """What is typed on the command line: names such as 003000, 2026_11_02, yes and no stay as they are typed.
+
+    YAML 1.1 takes the first two for numbers (the first an octal one), and the others for true and false.
+    """
+
+
+_INT, _BOOL = "tag:yaml.org,2002:int", "tag:yaml.org,2002:bool"
+_Typed.yaml_implicit_resolvers = {
+    first: [(tag, form) for tag, form in forms if tag not in (_INT, _BOOL)]
+    for first, forms in _Loader.yaml_implicit_resolvers.items()
+}
+_Typed.add_implicit_resolver(_INT, re.compile(r"^[-+]?(0|[1-9][0-9]*)$"), list("-+0123456789"))
+_Typed.add_implicit_resolver(_BOOL, re.compile(r"^(true|True|TRUE|false|False|FALSE)$"), list("tTfF"))
+_REMARK = re.compile(r"\s#")  # what YAML leaves out from there on, where it is not inside a list, mapping or quotes
+
+
 def load_yaml(path: Path) -> Data:
     """The mapping at the top of a YAML file; an empty file is an empty mapping.
 
@@ -53,7 +70,7 @@ def load_yaml(path: Path) -> Data:
 
 
 def parse_overrides(arguments: Sequence[str], *, flags: bool = False) -> list[tuple[str, Any]]:
-    """`--a.b=10` or `--a.b 10` as ("a.b", 10); values are YAML. With `flags`, `--a.b` alone is true.
+    """`--a.b=10` or `--a.b 10` as ("a.b", 10); values are YAML, but see `_Typed`. With `flags`, `--a.b` alone is true.
 
     Raises:
         ConfigError: an argument that is none of these.
@@ -71,7 +88,8 @@ def parse_overrides(arguments: Sequence[str], *, flags: bool = False) -> list[tu
                 raise ConfigError(f"the setting --{key} has no value; write --{key}=VALUE.")
             text = "true" if alone else rest.pop(0)
         try:
-            out.append((key, yaml.load(text, Loader=_Loader)))
+            plain = text == "-" or (_REMARK.search(text) is not None and text.lstrip()[:1] not in ("[", "{", "'", '"'))
+            out.append((key, text if plain else yaml.load(text, Loader=_Typed)))
         except yaml.YAMLError as error:
             raise ConfigError(f"--{key}: cannot read the value {text!r}: {error}") from error
     return out

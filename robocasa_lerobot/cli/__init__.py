@@ -6,6 +6,7 @@ import argparse
 import errno
 import importlib
 import os
+import select
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -71,10 +72,20 @@ def _nobody_reads() -> bool:
     """Whether standard output goes to a program that has ended, such as `head`; then nothing is written there again."""
     try:
         sys.stdout.flush()
+        gone = _has_no_reader(sys.stdout.fileno())  # unbuffered, there is nothing to flush
     except BrokenPipeError:
+        gone = True
+    if gone:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return True
-    return False
+    return gone
+
+
+def _has_no_reader(file: int) -> bool:
+    if not hasattr(select, "poll"):
+        return False
+    poller = select.poll()
+    poller.register(file, select.POLLOUT)
+    return any(event & (select.POLLERR | select.POLLHUP) for _, event in poller.poll(0))
 
 
 def _is_other_checkout(folder: Path) -> bool:

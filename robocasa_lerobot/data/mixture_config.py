@@ -168,8 +168,10 @@ class LoaderConfig:
     cache_open_files: int = 64
 
     def __post_init__(self) -> None:
-        if self.cache_open_files < 1:
-            raise UserError(f"loader: cache_open_files is {self.cache_open_files}, expected at least 1.")
+        for name, least in (("cache_open_files", 1), ("image_size", 1), ("workers", 0)):
+            value = getattr(self, name)
+            if value is not None and value < least:
+                raise UserError(f"loader: {name} is {value}, expected at least {least}.")
         _check_lists("loader", cameras=self.cameras)
 
 

@@ -144,6 +144,9 @@ def test_rules_of_a_file_replace_what_is_derived(tmp_path: Path) -> None:
         path.write_text(wrong)
         with pytest.raises(UserError, match=said):
             read_rules(path)
+    path.write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(UserError, match="cannot be read as YAML"):
+        read_rules(path)
 
 
 @pytest.fixture(scope="module")

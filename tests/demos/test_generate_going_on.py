@@ -12,6 +12,8 @@ import h5py
 import pytest
 
 from robocasa_lerobot import cli
+from robocasa_lerobot.corrections.disturbances import DisturbedSettings
+from robocasa_lerobot.corrections.settings import CorrectionSettings
 from robocasa_lerobot.demos.attempts import BrokenAttemptError, Parts, RecordingSettings
 from robocasa_lerobot.demos.generate.replays import check_scenes
 from robocasa_lerobot.demos.generate.settings import GenerationSettings
@@ -22,7 +24,7 @@ from robocasa_lerobot.demos.generate.sources.segments import PART
 from robocasa_lerobot.demos.generate.sources.source import sources_of
 from robocasa_lerobot.demos.hdf5 import recorded_otherwise, versions
 from robocasa_lerobot.demos.recorder import Recording
-from robocasa_lerobot.demos.recording import record_tasks
+from robocasa_lerobot.demos.recording import record_task, record_tasks
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.errors import LackingMachineError, UserError
 
@@ -67,6 +69,33 @@ def test_recorded_and_generated_ones_are_not_mixed() -> None:
     assert "method: 'contacts', now None" in recorded_otherwise(found, plain.identity(), software)
     assert not recorded_otherwise(found, generated.identity(), software)
     assert not recorded_otherwise({**plain.identity(), **software}, plain.identity(), software)
+
+
+def test_other_kinds_of_recordings_are_not_mixed() -> None:
+    software = versions()
+    plain = RecordingSettings(TASK, 1, varied=False)
+    kinds = [
+        plain,
+        DisturbedSettings(TASK, 1, varied=False, disturbances=2),
+        CorrectionSettings(TASK, 1, varied=False, policy="random", fingerprint="random"),
+        GenerationSettings(TASK, 1, varied=False),
+    ]
+    for found in kinds:
+        for now in kinds:
+            others = recorded_otherwise({**found.identity(), **software}, now.identity(), software)
+            assert bool(others) == (found is not now), (found, now, others)
+
+
+@pytest.mark.parametrize("content", [b"hello", b"", None])
+def test_a_file_that_holds_no_demonstrations_is_named(content: bytes | None, tmp_path: Path) -> None:
+    path = tmp_path / f"{TASK}.hdf5"
+    if content is None:
+        with h5py.File(path, "w") as file:
+            file["other"] = 1
+    else:
+        path.write_bytes(content)
+    with pytest.raises(UserError, match=rf"{TASK}\.hdf5 (is no HDF5 file|holds no demonstrations).*choose another"):
+        record_task(RecordingSettings(TASK, 1), tmp_path, show_progress=False)
 
 
 def test_replays_take_groups_of_kitchens_as_their_sources_do() -> None:

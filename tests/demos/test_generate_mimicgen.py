@@ -222,9 +222,16 @@ def test_what_a_template_cannot_say(tmp_path: Path, change: dict[str, Any], said
     path.write_text(json.dumps({"task": {"task_spec": {"stage_1": {}, "stage_2": {}}}}))
     with pytest.raises(UserError, match="RoboCasa"):
         read_json_template(path)
-    path.write_text("{")
-    with pytest.raises(UserError, match="JSON"):
-        read_json_template(path)
+    for content in (b"{", b"\xff\xfe\x00"):
+        path.write_bytes(content)
+        with pytest.raises(UserError, match="JSON"):
+            read_json_template(path)
+    for wrong, text in (({"task": 5}, "no `task.task_spec`"), ({"task": {"task_spec": {"s": "x"}}}, "found 'x'")):
+        path.write_text(json.dumps(wrong))
+        with pytest.raises(UserError, match=text):
+            read_json_template(path)
+    path.write_text(json.dumps(STACK | {"experiment": None}))
+    assert template_from(read_json_template(path)) == template_from(STACK | {"experiment": {}})
 
 
 def test_subtasks_end_after_their_signal_and_put_off_by_what_is_drawn() -> None:

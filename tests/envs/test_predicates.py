@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any, cast
+
 import mujoco
 import numpy as np
 import pytest
@@ -47,7 +49,7 @@ from robocasa_lerobot.envs.predicates import (
     parts_with_memory,
 )
 from robocasa_lerobot.envs.predicates.contacts import touching
-from robocasa_lerobot.envs.predicates.logic import every_goal_in, terms_by_name
+from robocasa_lerobot.envs.predicates.logic import Term, every_goal_in, terms_by_name
 from robocasa_lerobot.envs.predicates.objects import radius
 from robocasa_lerobot.envs.scene.build import build_scene
 from robocasa_lerobot.envs.scene.scene import Scene
@@ -338,7 +340,7 @@ def test_terms_of_one_name_are_refused_where_one_would_hide_the_other() -> None:
     out, into = PartWithin("rack", "rack0", low=0.9), PartWithin("rack", "rack0", high=0.1)
     for goal in (
         AllOf(near, far),
-        AllOf(near, Not(far)),
+        AllOf(Not(near), Not(far)),
         AnyOf(out, AllOf(near, into)),
         AllOf(near, DoorsOpen("drawer")),
     ):
@@ -348,7 +350,37 @@ def test_terms_of_one_name_are_refused_where_one_would_hide_the_other() -> None:
         terms_by_name(AllOf(When("where", {"a": near, "b": far}), near))
     # One of them alone is evaluated, or both are the same.
     assert terms_by_name(When("where", {"a": near, "b": far})) == {"drawer_open": (near, far)}
-    assert terms_by_name(AnyOf(AllOf(near, out), AllOf(near, Not(out)))).keys() == {"drawer_open", "rack0_set"}
+    either = AnyOf(AllOf(near, out), AllOf(near, Not(out)))
+    assert terms_by_name(either).keys() == {"drawer_open", "rack0_set", "not_rack0_set"}
+    assert terms_by_name(either, unwanted=False).keys() == {"drawer_open", "rack0_set"}
+
+
+class _Said(Term):
+    """A term that holds or does not, as said."""
+
+    def __init__(self, name: str, value: bool) -> None:
+        self._name, self.value = name, value
+
+    @property
+    def name(self) -> str:
+        return self._name
+
+    def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
+        return self.value
+
+
+@pytest.mark.parametrize("value", [True, False])
+def test_what_is_not_to_hold_is_reported_as_the_goal_wants_it(value: bool) -> None:
+    terms: dict[str, bool] = {}
+    scene, data = cast(Any, None), cast(Any, None)
+    assert Not(_Said("wrong_tool_on_board", value)).evaluate(scene, data, terms) is not value
+    assert terms == {"not_wrong_tool_on_board": not value}
+    goal = AllOf(_Said("a", True), Not(AnyOf(_Said("b", False), _Said("c", value))))
+    terms = {}
+    assert goal.evaluate(scene, data, terms) is not value
+    assert terms == {"a": True, "not_b": True, "not_c": not value}
+    # Whatever fails is among what is reported false.
+    assert goal.evaluate(scene, data, terms) == all(terms.values())
 
 
 def test_goals_are_equal_where_they_ask_for_the_same() -> None:

@@ -171,6 +171,22 @@ def test_a_state_that_is_set_after_the_end_goes_on(mode: AutoresetMode) -> None:
     assert pickle.dumps(found) == pickle.dumps(expected)
 
 
+def test_a_state_that_is_set_ends_the_hold_of_an_ended_env() -> None:
+    action = np.zeros(contract.ACTION_SIZE, dtype=np.float32)
+    with closing(hold.HoldAtEnd(KitchenEnv("OpenDrawer", cameras=(), horizon=2))) as env:
+        env.reset(seed=5)
+        begin = env.unwrapped.get_state()
+        expected = env.step(action)[0]["agent_pos"]
+        assert env.step(action)[3]
+        env.step(action)
+        assert env.unwrapped.steps == 2
+        env.get_wrapper_attr("set_state")(begin)
+        assert env.unwrapped.steps == 0
+        observation, *_, truncated, _ = env.step(action)
+        assert not truncated
+        assert np.array_equal(observation["agent_pos"], expected)
+
+
 def test_infos_of_different_tasks_stay_apart() -> None:
     with closing(make_vector_env([partial(FaultyEnv, "A"), partial(FaultyEnv, "B")], 3)) as envs:
         _, infos = envs.reset(seed=[4, 5, 6])

@@ -97,8 +97,10 @@ def test_a_label_with_a_slash_is_one_folder_of_films_and_one_file_of_rates(tmp_p
     assert {Path(str(r.video)).parts[:2] for r in records} == {
         ("videos", "demo__tune-000400"), ("videos", "demo__tune-000800"),
     }  # fmt: skip
+    (out / "eval_info.json").write_text("{}")  # of when the folder had one policy
     written = {path.name for path in write_eval_info(results.read_results(out), out)}
     assert written == {"eval_info_demo__tune-000400.json", "eval_info_demo__tune-000800.json"}
+    assert {path.name for path in out.glob("eval_info*")} == written
     with pytest.raises(UserError, match="would have one folder"):
         evaluate(out, **{"policy.path": "zero,random", "policy.label": "a/b,a__b"})
 

@@ -330,8 +330,31 @@ def test_clip_remembers_instructions(clip_folder: Path, monkeypatch: pytest.Monk
     monkeypatch.setattr(encoder.text_model, "forward", lambda **kw: sizes.append(len(kw["input_ids"])) or forward(**kw))
     first = encoder(tokens, mask)
     assert torch.equal(first, encoder(tokens, mask))
-    assert sizes == [2]
+    assert sizes == [1, 1]
     assert torch.equal(first[0], first[2])
+
+
+def test_what_clip_makes_of_an_instruction_depends_on_no_other(clip_folder: Path) -> None:
+    config = tiny_config(text_encoder="clip", clip_path=str(clip_folder))
+    words = ["open the drawer", "close it", "open the left drawer .", "close the right drawer", "open it"]
+    tokens, mask = ClipTokensStep(path=str(clip_folder)).tokenize(words)
+    encoder = DiffusionTransformerPolicy(config).observation_encoder.text_encoder
+    whole = encoder(tokens, mask)
+    for i in reversed(range(len(words))):
+        encoder._memory.clear()  # as after a restart
+        assert torch.equal(encoder(tokens[i : i + 1], mask[i : i + 1])[0], whole[i])
+
+
+@pytest.mark.parametrize("saved", [True, False])
+def test_a_policy_with_clip_can_be_looked_at_without_its_weights(saved: bool, clip_folder: Path) -> None:
+    config = tiny_config(text_encoder="clip", clip_path=str(clip_folder), clip_saved=saved)
+    real = DiffusionTransformerPolicy(config)
+    config = copy.deepcopy(config)
+    config.device = "meta"
+    with torch.device("meta"):
+        shapes = DiffusionTransformerPolicy(config)
+    assert all(parameter.is_meta for parameter in shapes.parameters())
+    assert {n: p.shape for n, p in shapes.named_parameters()} == {n: p.shape for n, p in real.named_parameters()}
 
 
 def test_missing_clip_is_explained(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -114,6 +114,19 @@ def test_a_disk_that_is_full_at_the_start_is_told_with_a_remedy(tmp_path: Path) 
         assert demos(tmp_path) == ["demo_0"]
 
 
+@pytest.mark.parametrize(("first", "second"), [("random", ""), ("", "random")])
+def test_episodes_with_a_policy_and_without_are_not_mixed(first: str, second: str, tmp_path: Path) -> None:
+    with Store(settings(tmp_path, policy=first)).held() as store:
+        save(store, 0)
+    with (
+        pytest.raises(UserError, match=r"with_policy: .* choose another --out"),
+        Store(settings(tmp_path, policy=second)).held(),
+    ):
+        pass
+    with Store(settings(tmp_path, policy=first)).held() as store:
+        assert store.saved == [0]
+
+
 def test_a_folder_that_cannot_be_is_a_mistake_before_anything_is_loaded(tmp_path: Path) -> None:
     file = tmp_path / "file"
     file.touch()

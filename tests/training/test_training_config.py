@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 
 import pytest
 import yaml
+from lerobot.configs.policies import PreTrainedConfig
 
-from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.errors import UnknownNameError, UserError
+from robocasa_lerobot.policies.registry import register_policies
 from robocasa_lerobot.training.config import experiment_files as overlay
 from robocasa_lerobot.training.config.experiment import ExperimentConfig, load_experiment, to_yaml
+from robocasa_lerobot.training.setup.optimizers import check_optimizer
 
 EXPERIMENT = """
 name: try
@@ -66,6 +70,8 @@ def test_overrides(path: Path, arguments: list[str], dotted: str, value: object)
     ("arguments", "message"),
     [
         (["--stepz=1"], "unknown key 'stepz'"),
+        (["--loader.workers=-1"], "workers is -1, expected at least 0"),
+        (["--loader.image_size=0"], "image_size is 0, expected at least 1"),
         (["--defaults.stepz=1"], "Did you mean 'steps'"),
         (["--phases.finetune.batchsize=1"], r"'batchsize'.*'batch_size'.*phases\.finetune"),
         (["--phases.finetune.ema.powr=1"], "Did you mean 'power'"),
@@ -125,3 +131,24 @@ def test_a_pattern_changes_all_phases_that_match(tmp_path: Path) -> None:
         {"name": "atomic_30", "steps": 2, "batch_size": 8},
         {"name": "last", "steps": 3},
     ]
+
+
+def test_a_pattern_that_fits_no_phase_is_named(path: Path) -> None:
+    variant = path.with_name("variant.yaml")
+    variant.write_text(f"base: {path.name}\nphases: [{{name: 'fine*', steps: 5}}]\n")
+    assert [phase.steps for phase in load_experiment(variant).phases][1] == 5
+    variant.write_text(f"base: {path.name}\nphases: [{{name: 'fin_*', steps: 5}}]\n")
+    with pytest.raises(UnknownNameError, match=r"'fin_\*'.*finetune"):
+        load_experiment(variant)
+
+
+@pytest.mark.parametrize("name", ["cosine", "cosine_with_restarts"])
+def test_a_cosine_that_would_rise_again_is_refused(name: str, path: Path) -> None:
+    register_policies()
+    config = PreTrainedConfig.get_choice_class("diffusion_transformer")()
+    phase = dataclasses.replace(load_experiment(path).phases[0], steps=12, schedule_steps=6)
+    phase.scheduler = {"type": "diffuser", "name": name, "num_warmup_steps": 1}
+    with pytest.raises(UserError, match=r"schedule_steps is 6, but there are 12 steps.*Give at least 12"):
+        check_optimizer(config, phase)
+    check_optimizer(config, dataclasses.replace(phase, schedule_steps=12))
+    check_optimizer(config, dataclasses.replace(phase, scheduler={**phase.scheduler, "name": "linear"}))

@@ -35,13 +35,19 @@ def eval_info(results: Results, label: str) -> dict[str, Any]:
 
 
 def write_eval_info(results: Results, folder: Path) -> list[Path]:
-    """Write `eval_info.json`, or `eval_info_<label>.json` for each of several policies; returns the paths."""
+    """Write `eval_info.json`, or `eval_info_<label>.json` for each of several policies; returns the paths.
+
+    Files of before go that are under another name than these, as when a second policy came into the folder.
+    """
     labels = list(dict.fromkeys(record.label for record in results.trials))
     paths = []
     for label in labels:
         path = folder / ("eval_info.json" if len(labels) == 1 else f"eval_info_{file_name(label)}.json")
         write_text(path, json.dumps(eval_info(results, label), indent=2))
         paths.append(path)
+    for path in folder.glob("eval_info*.json"):
+        if path not in paths:
+            path.unlink()
     return paths
 
 

@@ -18,6 +18,7 @@ from robocasa_lerobot.evaluation.statistics.data_efficiency import DataWorth, wo
 # Target demonstrations per task of the whole benchmark: 100 %.
 ALL_DEMOS = 500
 TARGET_ONLY = "target only"
+NOTHING = "none"  # no training data at all before the target's
 ALL = "all"
 
 
@@ -132,7 +133,7 @@ def _is_pretrained(policy: PolicyResult) -> bool:
     known = next((column for column in table.columns if column.key in keys), None)
     if known is not None:
         return bool(known.facts["pretrained"])
-    return (policy.info.training_data or "").strip().lower() != TARGET_ONLY
+    return (policy.info.training_data or "").strip().lower() not in (TARGET_ONLY, NOTHING)
 
 
 def _group(key: str, only: Mapping[int, PolicyResult], pretrained: Mapping[int, PolicyResult]) -> GroupCurves:

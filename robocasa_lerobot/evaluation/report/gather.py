@@ -30,6 +30,8 @@ from robocasa_lerobot.evaluation.report.policies import (
 from robocasa_lerobot.evaluation.statistics import success_rate
 from robocasa_lerobot.evaluation.statistics.horizon import time_to_success
 
+_LABELS = ("lifelong_phase", "demo_fraction", "training_data")  # that a user gives for the report
+
 
 def gather(results: Sequence[Path], title: str | None = None) -> ReportData:
     """Read runs.
@@ -151,7 +153,11 @@ def _headers(results: Results, conditions: Mapping[str, Sequence[TaskResult]]) -
 
 
 def _info(results: Results, conditions: Mapping[str, Sequence[TaskResult]]) -> PolicyInfo:
-    return results.policy_of(next(iter(conditions.values()))[0].trials[0])
+    """The policy as the run of its first trial describes it, with the labels that any run was given last."""
+    info = results.policy_of(next(iter(conditions.values()))[0].trials[0])
+    told = [header.policies[info.label] for header in results.headers.values() if info.label in header.policies]
+    given = {name: value for policy in told for name in _LABELS if (value := getattr(policy, name)) is not None}
+    return dataclasses.replace(info, **given)
 
 
 def _training_order(policy: PolicyResult) -> tuple[bool, int]:

@@ -2,8 +2,9 @@
 
 The benchmark fine-tunes each target split by itself, so that "pretraining + target, 10 %" is three policies, each
 evaluated on its own tasks. Here they become one `PolicyResult` with the tasks of all. Policies are joined only if
-their experiment, labels and rules agree and no task was evaluated with two of them: then neither is left out, they
-stay apart and are shown both.
+their experiment, labels and rules agree, no task was evaluated with two of them and they are not of two steps of one
+phase: else neither is left out, they stay apart and are shown both. Of policies that name no experiment only the very
+same weights are joined.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ def join(policies: Sequence[PolicyResult]) -> tuple[PolicyResult, ...]:
     for number, policy in enumerate(policies):
         key = _key(policy)
         found = groups.setdefault(number if key is None else key, [])
-        fitting = next((group for group in found if all(not _overlap(policy, other) for other in group)), None)
+        fitting = next((group for group in found if all(_fit(policy, other) for other in group)), None)
         if fitting is None:
             found.append([policy])
         else:
@@ -50,9 +51,13 @@ def _key(policy: PolicyResult) -> Hashable | None:
     if not policy.places and not perturbed and not any(label is not None for label in labels):
         return None
     rules = tuple(getattr(policy.header, rule) for rule in _RULES)
+    trained: tuple[Hashable, ...] = (info.experiment, training_folder(info.path))
+    if trained == (None, None):
+        if not info.fingerprint or info.remote is not None:  # nobody knows the weights behind a socket
+            return None
+        trained = (info.fingerprint,)
     return (
-        info.experiment,
-        training_folder(info.path),
+        *trained,
         info.type,
         labels,
         policy.places,
@@ -112,8 +117,11 @@ def training_folder(path: str) -> Path | None:
     return above[3] if len(above) > 3 and above[1].name == "checkpoints" else None
 
 
-def _overlap(a: PolicyResult, b: PolicyResult) -> bool:
-    return bool({result.task for result in a.tasks} & {result.task for result in b.tasks})
+def _fit(a: PolicyResult, b: PolicyResult) -> bool:
+    """Whether two policies have no task in common, and are not two steps of one phase."""
+    overlap = {result.task for result in a.tasks} & {result.task for result in b.tasks}
+    same_phase = a.info.phase is not None and a.info.phase == b.info.phase
+    return not overlap and not (same_phase and a.info.step != b.info.step)
 
 
 def _joined(group: Sequence[PolicyResult]) -> PolicyResult:

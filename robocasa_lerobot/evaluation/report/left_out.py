@@ -18,7 +18,7 @@ _SHOWN = 3
 
 def is_partial(policy: PolicyResult) -> bool:
     """Whether any of a policy's runs lacks tasks that its protocol names, or trials that it planned."""
-    lacks_tasks = any(header.missing_tasks or header.missing_by_set for header in policy.headers)
+    lacks_tasks = any(tasks or by_set for _, tasks, by_set in lacking(policy))
     return lacks_tasks or any(_unfinished(part) is not None for part in policy.parts or (policy,))
 
 
@@ -26,13 +26,32 @@ def partial_runs(data: ReportData) -> str | None:
     """Which policies were not run on all tasks of their protocols or in all planned trials, and what they lack."""
     labels: dict[str, list[str]] = {}
     for policy in data.single:
-        said = [partial_sentence(h.task_sets, h.missing_tasks, h.missing_by_set) for h in policy.headers]
+        said = [partial_sentence(*lacks) for lacks in lacking(policy)]
         for sentence in dict.fromkeys((*said, _unfinished(policy))):
             if sentence is not None:
                 labels.setdefault(sentence, []).append(policy.label)
     if data.not_begun:
         labels["planned, and none of its trials is recorded."] = list(data.not_begun)
     return " ".join(f"{_some(names)}: {sentence}" for sentence, names in labels.items()) or None
+
+
+def lacking(policy: PolicyResult) -> list[tuple[dict[str, list[str]], list[str], dict[str, list[str]]]]:
+    """Of each of a policy's runs: its task sets with the tasks that were run, the tasks that no run of its has, and
+    the same by set.
+
+    What one run left out a later one in the same folder may have.
+    """
+    run = {result.task for results in policy.conditions.values() for result in results}
+    found = []
+    for header in policy.headers:
+        by_set = {name: [t for t in tasks if t not in run] for name, tasks in header.missing_by_set.items()}
+        sets = {
+            name: [*header.task_sets.get(name, ()), *(t for t in header.missing_by_set.get(name, ()) if t in run)]
+            for name in {**header.task_sets, **header.missing_by_set}
+        }
+        missing = [task for task in header.missing_tasks if task not in run]
+        found.append((sets, missing, {name: tasks for name, tasks in by_set.items() if tasks}))
+    return found
 
 
 def _unfinished(policy: PolicyResult) -> str | None:

@@ -127,8 +127,14 @@ def _rate(point: float | Counts) -> float:
 
 
 def _draw(point: float | Counts, rng: np.random.Generator, resamples: int) -> Array:
-    """Mean success rates (resamples,) of counts drawn again: within tasks, from rates shrunk by half a trial."""
+    """Mean success rates (resamples,) of counts drawn again, within tasks, about the rates that were found.
+
+    They vary as trials of rates that are shrunk by half a trial, since a task at 0 would not vary at all; but about the
+    found ones: shrinking pulls the less, the more trials there are, and would move one curve against the other.
+    """
     assert not isinstance(point, (int, float))
     x, n = (np.array(column, dtype=np.float64) for column in zip(*(pair for pair in point if pair[1]), strict=True))
-    means: Array = (rng.binomial(n.astype(int), (x + 0.5) / (n + 1), size=(resamples, len(n))) / n).mean(axis=1)
+    shrunk = (x + 0.5) / (n + 1)
+    drawn = rng.binomial(n.astype(int), shrunk, size=(resamples, len(n))) / n
+    means: Array = np.clip((x / n - shrunk + drawn).mean(axis=1), 0.0, 1.0)
     return means

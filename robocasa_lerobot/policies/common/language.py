@@ -18,7 +18,7 @@ from torch import Tensor, nn
 
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.policies.common.configuration import LANGUAGE_HEADS
-from robocasa_lerobot.policies.common.transfer import each_once, is_plain_cpu, to_device
+from robocasa_lerobot.policies.common.transfer import each_once, is_plain_cpu, to_device, without_weights
 
 SUBWORDS = 8  # per word: the word itself and its first seven trigrams
 PADDING = 0  # token of no word; hashes are 1 ... buckets
@@ -141,7 +141,7 @@ class ClipTextEncoder(nn.Module):
         if saved and config is not None:  # weights follow from the checkpoint
             model = CLIPTextModelWithProjection(CLIPTextConfig(**config))
         else:
-            model = _from_pretrained(CLIPTextModelWithProjection, path, "text encoder")
+            model = _from_pretrained(CLIPTextModelWithProjection, path, "text encoder", CLIPTextConfig)
         self.config = {name: getattr(model.config, name) for name in _CLIP_FIELDS}
         self.dim = int(model.config.projection_dim)
         model.requires_grad_(False)
@@ -169,8 +169,12 @@ class ClipTextEncoder(nn.Module):
         if new:
             model = self.text_model.to(tokens.device).eval()
             with torch.autocast(tokens.device.type, enabled=False):
-                embeddings = model(input_ids=tokens[new], attention_mask=mask[new].long()).text_embeds.float()
-            self._memory.update({keys[i]: embedding for i, embedding in zip(new, embeddings, strict=True)})
+                for i in new:
+                    # By itself: beside others its last bits would depend on which of them are new, too, and so on
+                    # whether training was interrupted, or which trials an evaluation runs together.
+                    one = slice(i, i + 1)
+                    found = model(input_ids=tokens[one], attention_mask=mask[one].long()).text_embeds
+                    self._memory[keys[i]] = found[0].float()
         known = torch.stack([self._memory[key].to(tokens.device) for key in different])
         return known[to_device(where, tokens.device)]
 
@@ -179,8 +183,10 @@ class ClipTextEncoder(nn.Module):
         super()._load_from_state_dict(*args, **kwargs)
 
 
-def _from_pretrained(cls: Any, path: str, what: str) -> Any:
+def _from_pretrained(cls: Any, path: str, what: str, config: Any = None) -> Any:
     try:
+        if config is not None and without_weights():
+            return cls(config.from_pretrained(path))
         return cls.from_pretrained(path)
     except (OSError, ValueError) as error:
         kind = "folder" if Path(path).exists() else "hub name or folder"

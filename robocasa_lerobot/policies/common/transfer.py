@@ -26,6 +26,11 @@ def is_plain_cpu(device: torch.device) -> bool:
     return device.type == "cpu" and not torch.compiler.is_compiling()
 
 
+def without_weights() -> bool:
+    """Whether modules are made that only tell their shapes (`torch.device("meta")`), into which nothing is loaded."""
+    return torch.get_default_device().type == "meta"
+
+
 def each_once[Item: Hashable](items: Iterable[Item]) -> tuple[list[Item], Tensor]:
     """The items without repetitions, in the order of their first places, and which of them each one is (N,)."""
     place: dict[Item, int] = {}

@@ -8,6 +8,7 @@ from typing import Any
 from torch import Tensor, nn
 
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.policies.common.transfer import without_weights
 from robocasa_lerobot.policies.flow_vla.configuration_flow_vla import FlowVlaConfig
 from robocasa_lerobot.policies.flow_vla.prefix import Prefix
 
@@ -84,6 +85,8 @@ def _load(config: FlowVlaConfig) -> Any:
             if not 1 <= config.prefix_layers <= there:
                 raise UserError(f"prefix_layers is {config.prefix_layers}, but {path!r} has {there}; use 1 to {there}.")
             wanted.text_config.num_hidden_layers = config.prefix_layers
+        if without_weights():
+            return AutoModel.from_config(wanted, dtype="float32")
         return AutoModel.from_pretrained(path, config=wanted, dtype="float32")
     except (OSError, ValueError) as error:
         if isinstance(error, UserError):

@@ -96,6 +96,12 @@ class ExperimentConfig:
                 "input), `replace` (those of this phase's data) or `pool` (both)."
             )
 
+        if phase.statistics == "pool" and self.init_of(phase) not in (FROM_SCRATCH, *earlier):
+            raise UserError(
+                f"phase {phase.name!r}: `statistics: pool` needs the data of what it starts from, and "
+                f"{self.init_of(phase)!r} is no phase of this experiment. Set `keep` or `replace`."
+            )
+
     def _check_replay(self, phase: PhaseConfig) -> None:
         if phase.replay is None:
             return

@@ -106,6 +106,8 @@ def _merge_phases(base: list[Data], changes: list[Data]) -> list[Data]:
         if "*" in phase["name"]:  # what changes in all phases so far that match
             own = {key: value for key, value in phase.items() if key != "name"}
             matching = [name for name in out if fnmatch.fnmatchcase(name, phase["name"])]
+            if not matching:
+                raise UnknownNameError("phase", phase["name"], out, "(a pattern that none of the phases so far fits)")
             out |= {name: merge(out[name], own) for name in matching}
         else:
             out[phase["name"]] = merge(out.get(phase["name"], {}), phase)

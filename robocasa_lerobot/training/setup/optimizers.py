@@ -98,9 +98,14 @@ def _schedule(
     config: PreTrainedConfig, phase: PhaseConfig, optimizer: torch.optim.Optimizer
 ) -> torch.optim.lr_scheduler.LRScheduler | None:
     """The same for an optimiser."""
-    settings = _schedule_settings(config, phase)
+    settings, steps = _schedule_settings(config, phase), phase.schedule_steps or phase.steps
+    if isinstance(settings, DiffuserSchedulerConfig) and "cosine" in settings.name and steps < phase.steps:
+        raise UserError(
+            f"phase {phase.name!r}: schedule_steps is {steps}, but there are {phase.steps} steps, and past its end a "
+            f"cosine rises again to the full rate. Give at least {phase.steps}, or leave it out."
+        )
     try:
-        return settings.build(optimizer, phase.schedule_steps or phase.steps) if settings is not None else None
+        return settings.build(optimizer, steps) if settings is not None else None
     except ValueError as error:  # of diffusers, about a name that it does not know, or what that lacks
         raise UserError(f"phase {phase.name!r}: `scheduler`: {error}.") from error
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from robocasa_lerobot.evaluation.records.results import UNPERTURBED, PolicyInfo
+from robocasa_lerobot.evaluation.report.left_out import lacking
 from robocasa_lerobot.evaluation.report.model import Block, Listing, Section
 from robocasa_lerobot.evaluation.report.policies import PolicyResult, ReportData, describe_policy
 from robocasa_lerobot.evaluation.report.sections.beside_published import horizon_phrase, success_phrase
@@ -106,7 +107,7 @@ def common_settings(policies: Sequence[PolicyResult]) -> list[tuple[str, str]]:
         for policy in policies
     ]
     rows.append(("git commit", _same_or_each(commits, policies)))
-    missing = sorted({task for policy in policies for task in policy.header.missing_tasks})
+    missing = sorted({task for policy in policies for _, tasks, _ in lacking(policy) for task in tasks})
     if missing:
         rows.append(("tasks of the protocol left out", ", ".join(missing)))
     return rows
