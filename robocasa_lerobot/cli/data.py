@@ -104,7 +104,11 @@ def run(args: argparse.Namespace) -> int:
         for need in [piece.need for piece in pieces if piece.need.waits]:
             print(f"{need.root} comes later: it corrects the policy of {need.policy}, which is not trained yet")
         pieces = [piece for piece in pieces if not piece.need.waits]
-        return _said(make_datasets(pieces, execution, cores)) if pieces else 0
+        others = [need for need in needs or [] if need.missing and need.made is None]
+        status = _said(make_datasets(pieces, execution, cores)) if pieces else 0
+        if others:
+            print(f"{len(others)} missing dataset(s) are none that can be made here: how to get them is listed above")
+        return 1 if others else status
     return int(args.check and any(need.missing for need in needs or []))
 
 

@@ -54,6 +54,8 @@ def test_phases_name_what_they_change(path: Path) -> None:
         (["--policy.chunk_size=9"], "policy.chunk_size", 9),
         (["--phases.finetune.learning_rate=2e-5"], "phases.finetune.learning_rate", 2e-5),
         (["--phases.finetune.mixture.alpha=1"], "phases.finetune.mixture.alpha", 1.0),
+        (["--phases.finetune.mixture.members.0.weight=5"], "phases.finetune.mixture.members.0.weight", 5.0),
+        (["--defaults.mixture.members.0.weight=5"], "phases.pretrain.mixture.members.0.weight", 5.0),
         (["--loader.cache_frames=false"], "loader.cache_frames", False),
         (["--output_dir=other"], "output_dir", "other"),
         (["--mixed_precision=no"], "mixed_precision", "no"),
@@ -78,6 +80,7 @@ def test_overrides(path: Path, arguments: list[str], dotted: str, value: object)
         (["--loader.cache_frame=1"], "Did you mean 'cache_frames'"),
         (["--phases.fintune.steps=1"], "Did you mean 'finetune'"),
         (["--phases.2.steps=1"], "has 2 entries"),
+        (["--phases.pretrain.mixture.members.7.weight=1"], "has 2 entries"),
         (["--phases.pretrain.steps=many"], "steps"),
         (["--phases.pretrain.steps=0"], "expected at least 1"),
         (["--phases.pretrain.statistics=keeep"], "Did you mean 'keep'"),
@@ -152,3 +155,25 @@ def test_a_cosine_that_would_rise_again_is_refused(name: str, path: Path) -> Non
         check_optimizer(config, phase)
     check_optimizer(config, dataclasses.replace(phase, schedule_steps=12))
     check_optimizer(config, dataclasses.replace(phase, scheduler={**phase.scheduler, "name": "linear"}))
+
+
+@pytest.mark.parametrize(
+    ("field", "change", "message"),
+    [
+        ("optimizer", {"lr": "fast"}, "`optimizer.lr` is 'fast', expected a number"),
+        ("optimizer", {"weight_decay": True}, "`optimizer.weight_decay` is True, expected a number"),
+        ("optimizer", {"type": "adam", "betas": 3}, "`optimizer.betas` is 3, expected a list of 2 numbers"),
+        ("optimizer", {"betas": [0.9]}, "expected a list of 2 numbers"),
+        ("optimizer", {"wieght_decay": 1}, "Did you mean 'weight_decay'"),
+        ("scheduler", {"type": "diffuser", "name": "cosine", "num_warmup_steps": "abc"}, "num_warmup_steps` is 'abc'"),
+    ],
+)
+def test_values_of_another_kind_for_the_optimiser_are_named(
+    field: str, change: dict[str, object], message: str, path: Path
+) -> None:
+    register_policies()
+    config = PreTrainedConfig.get_choice_class("diffusion_transformer")()
+    phase = load_experiment(path).phases[0]
+    check_optimizer(config, phase)
+    with pytest.raises(UserError, match=message):
+        check_optimizer(config, dataclasses.replace(phase, **{field: change}))

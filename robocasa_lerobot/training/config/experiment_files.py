@@ -56,16 +56,44 @@ def resolve(path: Path, overrides: Sequence[tuple[str, Any]] = ()) -> Data:
         UserError: a missing file, files that are each other's base, or an override that leads nowhere.
     """
     data = _load(path, ())
-    for key, value in overrides:
-        set_dotted(data, key, value)
+    inside = {key for key, _ in overrides if _is_inside_a_file(data, key)}
+    later = {key for key in inside if key.startswith("phases.")}  # what they change may come from `defaults`
+    _set_all(data, [(key, value) for key, value in overrides if key not in inside])
     data = _at_file_keys(data, _included)
+    _set_all(data, [(key, value) for key, value in overrides if key in inside - later])
     defaults = data.pop("defaults", None) or {}
     registry = data.pop(REGISTRY, None)
     if isinstance(data.get("phases"), list):
         data["phases"] = [merge(defaults, p) if isinstance(p, Mapping) else p for p in data["phases"]]
+        _set_all(data, [(key, value) for key, value in overrides if key in later])
         for phase in data["phases"] if registry is not None else ():
             _set_registry(phase, registry)
     return data if registry is None else {**data, REGISTRY: registry}
+
+
+def _set_all(data: Data, overrides: Sequence[tuple[str, Any]]) -> None:
+    for key, value in overrides:
+        set_dotted(data, key, value)
+
+
+def _is_inside_a_file(data: Any, dotted: str) -> bool:
+    """Whether a setting such as `phases.pretrain.mixture.members.0.weight` is in a list or mapping of a file.
+
+    Or of what a phase has from `defaults`: at least two steps below a policy or mixture that is not spelt out here.
+    """
+    here, steps = data, dotted.split(".")
+    for number, step in enumerate(steps[:-1]):
+        below = number > 0 and steps[number - 1] in FILE_KEYS
+        if below and (here is None or (isinstance(here, Mapping) and "file" in here and step not in here)):
+            return True
+        if isinstance(here, Mapping):
+            here = here.get(step)
+        elif isinstance(here, list):
+            named = [item for item in here if isinstance(item, Mapping) and item.get("name") == step]
+            here = named[0] if named else here[int(step)] if step.isdecimal() and int(step) < len(here) else None
+        else:
+            return False
+    return False
 
 
 def _set_registry(phase: Any, registry: str) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import typing
 from collections.abc import Mapping
 from typing import Any
 
@@ -122,6 +123,7 @@ def _changed(registry: Any, preset: Any, changes: Mapping[str, Any], what: str) 
         if key not in names:
             raise UnknownNameError("key", key, names, f"(in `{what}`)")
     fields = {key: tuple(value) if isinstance(value, list) else value for key, value in fields.items()}
+    _check_types(chosen, fields, what)
     if preset is not None and kind == preset.type:
         return dataclasses.replace(preset, **fields)
     # What both have stays the policy's own: LeRobot's defaults are another rate and another clipping.
@@ -130,6 +132,27 @@ def _changed(registry: Any, preset: Any, changes: Mapping[str, Any], what: str) 
         return chosen(**{**common, **fields})
     except TypeError as error:
         raise UserError(f"`{what}` of type {kind!r}: {error}.") from error
+
+
+def _check_types(kind: type, values: Mapping[str, Any], what: str) -> None:
+    """Check that numbers are numbers and tuples of them tuples, which neither LeRobot nor PyTorch does in words."""
+    for key, hint in typing.get_type_hints(kind).items():
+        if key not in values or (values[key] is None and type(None) in typing.get_args(hint)):
+            continue
+        value, wanted = values[key], next((one for one in (hint, *typing.get_args(hint)) if one in (int, float)), hint)
+        if typing.get_origin(hint) is tuple:
+            count = len(typing.get_args(hint))
+            right = isinstance(value, tuple) and len(value) == count and all(map(_is_number, value))
+            expected = f"a list of {count} numbers"
+        else:
+            right = wanted not in (int, float) or _is_number(value, whole=wanted is int)
+            expected = "a whole number" if wanted is int else "a number"
+        if not right:
+            raise UserError(f"`{what}.{key}` is {value!r}, expected {expected}.")
+
+
+def _is_number(value: Any, whole: bool = False) -> bool:
+    return isinstance(value, int if whole else (int, float)) and not isinstance(value, bool)
 
 
 def _warmup_is_given(phase: PhaseConfig) -> bool:
