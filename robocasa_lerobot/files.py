@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import platform
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,9 +12,13 @@ _ASIDE = ".partial"  # at the end, so that no pattern for finished files finds o
 
 
 @contextmanager
-def written_aside(path: Path) -> Iterator[Path]:
-    """A path beside `path` to write to, which takes its name at the end; if the body fails, it goes."""
-    aside = path.with_name(path.name + _ASIDE)
+def written_aside(path: Path, *, by_many: bool = False) -> Iterator[Path]:
+    """A path beside `path` to write to, which takes its name at the end; if the body fails, it goes.
+
+    Where processes may write the same file at once, `by_many` gives each a path of its own, and the last one stays.
+    """
+    own = f".{platform.node()}-{os.getpid()}" if by_many else ""
+    aside = path.with_name(f"{path.name}{own}{_ASIDE}")
     try:
         yield aside
         aside.replace(path)

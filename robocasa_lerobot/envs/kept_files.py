@@ -18,6 +18,8 @@ import numpy as np
 import PIL
 import platformdirs
 
+from robocasa_lerobot.files import written_aside
+
 CACHE_VARIABLE = "ROBOCASA_LEROBOT_CACHE"
 _CHECKSUM_BYTES = 4
 
@@ -40,7 +42,10 @@ def kept(folder: str, name: str, made_from: object, made_by: str, make: Callable
         if content[-_CHECKSUM_BYTES:] == _checksum(body):  # else a disk that was full has cut it
             return body
     body = make()
-    _write(file, body + _checksum(body))
+    with contextlib.suppress(OSError):
+        file.parent.mkdir(parents=True, exist_ok=True)
+        with written_aside(file, by_many=True) as aside:
+            aside.write_bytes(body + _checksum(body))
     return body
 
 
@@ -63,15 +68,3 @@ def stamp(*sources: Path) -> str:
 
 def _checksum(content: bytes) -> bytes:
     return zlib.crc32(content).to_bytes(_CHECKSUM_BYTES, "little")
-
-
-def _write(file: Path, content: bytes) -> None:
-    # Several processes may make the same at once: each writes aside under its own name, and the last one stays.
-    aside = file.with_name(f"{file.name}.{os.getpid()}.partial")
-    try:
-        file.parent.mkdir(parents=True, exist_ok=True)
-        aside.write_bytes(content)
-        aside.replace(file)
-    except OSError:
-        with contextlib.suppress(OSError):
-            aside.unlink(missing_ok=True)

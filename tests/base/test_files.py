@@ -79,3 +79,25 @@ def test_who_waits_gets_the_lock_next(tmp_path: Path) -> None:
         order.append("first")
     thread.join(30)
     assert order == ["first", "second"]
+
+
+def test_processes_that_write_the_same_file_at_once_have_paths_of_their_own(tmp_path: Path) -> None:
+    path = tmp_path / "file"
+    command = (
+        "import sys; from pathlib import Path; from robocasa_lerobot.files import written_aside\n"
+        "with written_aside(Path(sys.argv[1]), by_many=True) as aside:\n"
+        "    aside.write_text('theirs'); print(aside, flush=True); input()"
+    )
+    with subprocess.Popen(
+        [sys.executable, "-c", command, str(path)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as other:
+        assert other.stdin is not None
+        assert other.stdout is not None
+        theirs = Path(other.stdout.readline().strip())
+        with written_aside(path, by_many=True) as aside:
+            assert aside != theirs
+            aside.write_text("ours")
+        assert (path.read_text(), theirs.read_text()) == ("ours", "theirs")
+        other.stdin.write("\n")
+    assert path.read_text() == "theirs"
+    assert list(tmp_path.iterdir()) == [path]

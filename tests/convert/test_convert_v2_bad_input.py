@@ -189,6 +189,7 @@ def test_a_bad_episode_is_rejected_with_its_reason(name: str, damaged: Path) -> 
         if line["source_demo"] == f"episode_{index:06d}"
     ]
     assert EPISODES[name][1] in reason
+    assert reason.count("its extras/") <= 1  # said once
 
 
 def test_good_episodes_among_bad_ones_are_converted_whole(damaged: Path) -> None:

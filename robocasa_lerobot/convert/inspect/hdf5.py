@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -23,7 +25,6 @@ from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.progress import Bar
 
 _ACTION = re.compile(r"(^|/)actions?$")
-_OTHER_ACTIONS = re.compile(r"data/demo_[0-9]+/action")  # as `actions`, in the singular
 _MAX_DEPTH = 3  # groups below the file in which episodes are looked for
 _SHOWN_TEXT = 300  # characters of an attribute
 
@@ -74,7 +75,7 @@ def inspect_hdf5(path: Path) -> FileReport:
         SourceError: it cannot be read as HDF5.
     """
     found = survey(path) if path.is_file() else Survey()
-    layout, groups = _find_layout(path)
+    layout, groups = _find_layout(path, found)
     report = FileReport(str(path), path.stat().st_size, groups, layout=layout)
     if layout is None:
         return report
@@ -146,14 +147,23 @@ def is_picture(found: DatasetShape) -> bool:
     return len(found.shape) == 4 and found.shape[3] == 3 and found.dtype == "uint8"
 
 
-def _find_layout(path: Path) -> tuple[Layout | None, tuple[str, ...]]:
+def _say_action(file: DemoFile, demos: Sequence[str]) -> bool:
+    """Whether the first of some groups that opens has its actions as `action`, and not as `actions`."""
+    for demo in demos:
+        with contextlib.suppress(RejectedEpisodeError):
+            inside = file.members(demo)
+            return "action" in inside and "actions" not in inside
+    return False
+
+
+def _find_layout(path: Path, surveyed: Survey) -> tuple[Layout | None, tuple[str, ...]]:
     """The episodes and their actions, where the structure shows them; and the names at the top of the file."""
     with DemoFile(path, Layout(episodes="/")) as whole:  # the checks of opening, and no assumption
         groups, children_of_data = whole.members("/"), whole.members("data")
-        usual = any(re.fullmatch(r"demo_[0-9]+", name) for name in children_of_data)
-        shapes = whole.demo(WHOLE_FILE).shapes()
-        if usual and not any(_OTHER_ACTIONS.fullmatch(key) for key in shapes):
+        demos = [f"data/{name}" for name in children_of_data if re.fullmatch(r"demo_[0-9]+", name)]
+        if demos and not _say_action(whole, [demo for demo in demos if not surveyed.reason(f"/{demo}")]):
             return Layout(), groups
+        shapes = whole.demo(WHOLE_FILE).shapes()
     found: Counter[tuple[str, str]] = Counter()
     children: dict[tuple[str, str], set[str]] = {}
     for key in shapes:

@@ -256,15 +256,15 @@ class V2Episode:
         present = tuple(path for name in (EP_META, MODEL, STATES) if (path := folder / name).is_file())
         meta: dict[str, Any] = {}
         for path in present:
-            try:
-                if path.name == EP_META:
+            if path.name == MODEL:
+                read_scene(path)
+            elif path.name == STATES:
+                read_states(path, self.length)
+            else:
+                try:
                     meta = json.loads(path.read_text(encoding="utf-8"))
-                elif path.name == MODEL:
-                    read_scene(path)
-                else:
-                    read_states(path, self.length)
-            except (OSError, ValueError, RecursionError) as error:
-                raise RejectedEpisodeError(f"its extras/{path.name} cannot be used ({error}).") from None
+                except (OSError, ValueError, RecursionError) as error:
+                    raise RejectedEpisodeError(f"its extras/{path.name} cannot be used ({error}).") from None
         if not isinstance(meta, dict):
             raise RejectedEpisodeError(f"its {EP_META} is a JSON {type(meta).__name__}, expected an object.")
         return Extras(meta, present)

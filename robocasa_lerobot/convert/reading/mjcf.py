@@ -223,9 +223,11 @@ def _inside(root: Path, parts: Sequence[str], leading_out: list[Path] | None = N
         return None
     file = root.joinpath(*parts)
     try:
-        if file.is_file() and file.resolve().is_relative_to(root):
+        if not file.is_file():
+            return None
+        if file.resolve().is_relative_to(root):
             return file
-        if file.is_file() and leading_out is not None:
+        if leading_out is not None:
             leading_out.append(file)
         return None
     except OSError:  # a name that is too long, a folder that may not be entered

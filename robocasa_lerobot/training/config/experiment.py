@@ -95,7 +95,6 @@ class ExperimentConfig:
                 "normalised with: set `statistics` to `keep` (the checkpoint's, so that the same state stays the same "
                 "input), `replace` (those of this phase's data) or `pool` (both)."
             )
-
         if phase.statistics == "pool" and self.init_of(phase) not in (FROM_SCRATCH, *earlier):
             raise UserError(
                 f"phase {phase.name!r}: `statistics: pool` needs the data of what it starts from, and "

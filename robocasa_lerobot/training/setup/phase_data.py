@@ -10,7 +10,6 @@ from robocasa_lerobot.data.mixture import MixtureDataset, open_mixture
 from robocasa_lerobot.data.mixture_config import MemberConfig, MixtureConfig
 from robocasa_lerobot.data.reading.source import DatasetSource
 from robocasa_lerobot.data.statistics import Statistics
-from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.training.config.experiment import ExperimentConfig, PhaseConfig
 from robocasa_lerobot.training.weights.checkpoint import last_checkpoint
 
@@ -49,16 +48,9 @@ def pooled(
 
     Each phase counts by the samples drawn in it, each frame in it as often as it is drawn. Without `images`, of the
     numbers alone.
-
-    Raises:
-        UserError: the phase builds on no phase of this experiment, so that there are no data to pool with.
     """
     earlier = experiment.ancestors(phase)
-    if not earlier:
-        raise UserError(
-            f"phase {phase.name!r}: `statistics: pool` needs the data of what it starts from, and "
-            f"{experiment.init_of(phase)!r} is no phase of this experiment. Set `keep` or `replace`."
-        )
+    assert earlier, "the experiment has been checked: it pools only where a phase starts from another"
     samples = [other.steps * other.batch_size for other in [phase, *earlier]]
     shares = [count / sum(samples) for count in samples]
     opened = dict(dataset.sources)
