@@ -20,6 +20,8 @@ NAMES: tuple[str, ...] = tuple(contract.component_names(contract.ACTION_PARTS))
 OPEN, CLOSED, ARM_MODE = -1.0, 1.0, -1.0
 JUMP_M = 0.06  # of a phone from one step to the next: its tracking was lost, the hand stays
 _DELTAS = ("delta_x", "delta_y", "delta_z")
+# LeRobot has a phone's turns for a tool that points down (`EEReferenceAndDelta`): about x and z the other way round.
+_TURNS_OF_TOOL = np.array([-1.0, 1.0, -1.0])
 _TARGETS = ("target_x", "target_y", "target_z", "target_wx", "target_wy", "target_wz")
 
 
@@ -27,8 +29,8 @@ class HandTranslator:
     """Turns the actions of a device that leads the hand into the kitchen's; remembers the gripper and the last pose.
 
     Understood are `delta_x/y/z` in [-1, 1] with `gripper` 0 (close), 1 (stay), 2 (open), as LeRobot's gamepad and
-    keyboard give, and `target_x/y/z/wx/wy/wz` (m, rotation vector) since `enabled` became true, with `gripper_vel`, as
-    its phone gives.
+    keyboard give, and `target_x/y/z` (m, of the base) with `target_wx/wy/wz` (rotation vector, of the tool) since
+    `enabled` became true and `gripper_vel`, as its phone gives.
 
     Args:
         speed: share of the full speed.
@@ -78,7 +80,7 @@ class HandTranslator:
             self._last = None
             return np.zeros(6)
         values = np.array([float(said[name]) for name in _TARGETS])
-        now = values[:3], Rotation.from_rotvec(values[3:])
+        now = values[:3], Rotation.from_rotvec(values[3:] * _TURNS_OF_TOOL)
         last, self._last = self._last, now
         if last is None or np.linalg.norm(now[0] - last[0]) > JUMP_M:
             return np.zeros(6)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import argparse
 import importlib.util
-import json
 import pickle
 import re
 import shlex
@@ -26,6 +25,7 @@ from robocasa_lerobot.errors import UserError
 KINDS = ("local", "slurm", "ray")
 JOBS_FILE = "jobs.json"
 _FORGOTTEN = "Invalid job id"  # what squeue says of a job that ended some minutes ago
+_UNQUOTED = re.compile(r"[^\w/.+@:,=~-]")  # means something to a shell, or to sbatch (%)
 
 
 @dataclass(frozen=True)
@@ -143,23 +143,28 @@ def submit_to_slurm(
         skip_complete: False submits all pieces, for steps that find out themselves what is left of theirs.
 
     Returns:
-        Numbers of the array of jobs (None where all pieces are complete) and of the last job.
+        Numbers of the arrays of jobs, with commas (None where all pieces are complete), and of the last job.
 
     Raises:
         UserError: jobs of an earlier call are still in the queue, or Slurm refuses.
     """
-    from robocasa_lerobot.jobs.slurm import ArrayExecutor, JobRecord
+    from robocasa_lerobot.jobs.slurm import ArrayExecutor, JobRecord, NotedError, read_record
 
     record = logs / JOBS_FILE  # not in the folder of the work, which the last job removes
     if record.is_file():
-        waiting = _queued(json.loads(record.read_text(encoding="utf-8")), record)
+        waiting = _queued(read_record(record), record)
         if waiting:
             raise UserError(
                 f"the jobs of this work are still in the queue: {', '.join(waiting)}. Wait until they end (squeue), or "
                 "cancel them (scancel) and give the same command again."
             )
-    if any(re.search(r"\s", str(path.absolute())) for path in (folder, logs)):
-        raise UserError(f"{folder.parent}: datatrove's job files do not quote paths. Choose one without white space.")
+    found = {sign for path in (folder, logs) for sign in _UNQUOTED.findall(str(path.absolute()))}
+    if found:
+        shown = " ".join(map(repr, sorted(found)))
+        raise UserError(
+            f"{folder.parent}: datatrove's job files do not quote paths, and this one has {shown}. "
+            "Choose one of letters, digits and / . _ - + @ : , = ~ alone."
+        )
     folder.mkdir(parents=True, exist_ok=True)
     logs.mkdir(parents=True, exist_ok=True)
     taken = JobRecord(record)
@@ -177,6 +182,7 @@ def submit_to_slurm(
         mem_per_cpu_gb=slurm.mem_per_cpu_gb,
         gpus_per_task=slurm.gpus,
         qos=slurm.qos,
+        srun_args={"cpus-per-task": slurm.cpus},  # since Slurm 22.05 srun does not ask for what its job has
         sbatch_args={"account": slurm.account} if slurm.account else {},
         env_command=slurm.env_command or f"export PATH={shlex.quote(str(Path(sys.prefix) / 'bin'))}:$PATH",
         max_array_size=slurm.max_array_size,
@@ -187,12 +193,17 @@ def submit_to_slurm(
     pickled.write_bytes(pickle.dumps(finish))
     try:
         executor.run()
-        array = None if executor.job_id == -1 else str(executor.job_id)
+        arrays = [] if executor.job_id == -1 else list(taken.jobs)
         command = [sys.executable, "-m", "robocasa_lerobot.jobs.slurm", str(pickled)]
-        last = executor.submit_after([] if array is None else list(taken.jobs), shlex.join(command))
+        last = executor.submit_after(arrays, shlex.join(command))
+    except NotedError as error:
+        raise UserError(
+            f"Slurm took job {', '.join(taken.jobs)}, but {record} could not be written ({error}). Cancel what runs "
+            f"(scancel {' '.join(taken.jobs)}), free disk space, and give the same command again."
+        ) from error
     except (subprocess.CalledProcessError, OSError) as error:
         raise UserError(f"Slurm did not take the jobs: {error}. Its message stands above.") from error
-    return array, last
+    return ",".join(arrays) or None, last
 
 
 def _queued(jobs: list[str], record: Path) -> list[str]:

@@ -19,6 +19,7 @@ from robocasa_lerobot.jobs.pool import PoolExecutor
 
 _GIB = 2**30
 _SHOWN = 3
+_OUR_VARIABLES = ("ROBOCASA_LEROBOT_", "MUJOCO_", "HF_")
 
 
 def run_with_ray(
@@ -52,14 +53,15 @@ def run_with_ray(
     _check_node(settings, memory)
     # A new worker process for each piece: OpenGL, torch and the pieces' own processes are not handed on.
     asked = {"num_cpus": settings.cpus, "num_gpus": settings.gpus, "memory": memory}
-    remote = ray.remote(**asked, max_calls=1, max_retries=0)(_run_piece)
+    secret, told = _handed_on()
+    remote = ray.remote(**asked, max_calls=1, max_retries=0, runtime_env={"env_vars": told})(_run_piece)
     shared, here = ray.put(executor), str(Path.cwd())
     running: dict[Any, int] = {}
     failed: dict[int, str] = {}
     while waiting or running:
         while waiting and (settings.jobs < 1 or len(running) < settings.jobs):
             rank = waiting.pop(0)
-            running[remote.options(name=f"piece {rank}").remote(shared, rank, here)] = rank
+            running[remote.options(name=f"piece {rank}").remote(shared, rank, here, secret)] = rank
         for reference in ray.wait(list(running), num_returns=1)[0]:
             rank = running.pop(reference)
             try:
@@ -71,8 +73,19 @@ def run_with_ray(
         raise UserError(f"{len(failed)} of {pieces} pieces failed with Ray; the same command runs them again.\n{shown}")
 
 
-def _run_piece(executor: PoolExecutor, rank: int, folder: str) -> None:
+def _handed_on() -> tuple[dict[str, str], dict[str, str]]:
+    """Variables of the command that its pieces need: a cluster's processes have those with which Ray was started.
+
+    Tokens come apart from the others, which Ray shows to everybody.
+    """
+    wanted = {name: value for name, value in os.environ.items() if name.startswith(_OUR_VARIABLES)}
+    secret = {name: value for name, value in wanted.items() if "TOKEN" in name}
+    return secret, {name: value for name, value in wanted.items() if name not in secret}
+
+
+def _run_piece(executor: PoolExecutor, rank: int, folder: str, secret: Mapping[str, str]) -> None:
     """Run a piece in the folder in which the command was given: that of a cluster is where Ray was started."""
+    os.environ.update(secret)
     try:
         os.chdir(folder)
     except OSError as error:

@@ -17,6 +17,31 @@ from datatrove.executor.base import DistributedEnvVars
 from datatrove.executor.slurm import SlurmPipelineExecutor, default_job_id_retriever, launch_slurm_job
 from datatrove.utils.logging import logger as datatrove_logger
 
+from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.files import write_text
+
+
+class NotedError(Exception):
+    """A job that Slurm has taken could not be noted."""
+
+
+def read_record(file: Path) -> list[str]:
+    """The jobs that were noted.
+
+    Raises:
+        UserError: the file cannot be read as such.
+    """
+    try:
+        jobs = json.loads(file.read_text(encoding="utf-8"))
+        if isinstance(jobs, list):
+            return [str(job) for job in jobs]
+    except ValueError:
+        pass
+    raise UserError(
+        f"{file}: found no list of jobs. See with squeue whether jobs of an earlier call still run; remove the file "
+        "when none does."
+    )
+
 
 @dataclass
 class JobRecord:
@@ -34,7 +59,10 @@ class JobRecord:
         """The job's number."""
         number = str(default_job_id_retriever(said, -1))
         self.jobs.append(number)
-        self.file.write_text(json.dumps(self.jobs), encoding="utf-8")
+        try:
+            write_text(self.file, json.dumps(self.jobs))
+        except OSError as error:
+            raise NotedError(str(error)) from error
         return number
 
 
@@ -72,8 +100,9 @@ class ArrayExecutor(SlurmPipelineExecutor):
 
 
 def main() -> None:
-    """Call the pickled function."""
-    pickle.loads(Path(sys.argv[1]).read_bytes())()
+    """Call the pickled function; a whole number that it returns is the job's exit status."""
+    result = pickle.loads(Path(sys.argv[1]).read_bytes())()
+    sys.exit(result if isinstance(result, int) else 0)
 
 
 if __name__ == "__main__":

@@ -165,10 +165,12 @@ def _outcome(pieces: Sequence[Piece], logs: Path) -> Outcome:
     return Outcome(failed, remarks)
 
 
-def _summed_up(pieces: Sequence[Piece], logs: Path) -> None:
-    """What Slurm's last job prints."""
-    for line in outcome_lines(_outcome(pieces, logs)):
+def _summed_up(pieces: Sequence[Piece], logs: Path) -> int:
+    """What Slurm's last job prints, and its exit status."""
+    outcome = _outcome(pieces, logs)
+    for line in outcome_lines(outcome):
         print(line)
+    return int(bool(outcome.failed))
 
 
 def outcome_lines(outcome: Outcome) -> list[str]:

@@ -313,7 +313,7 @@ class Session:
                 self.note("warning", f"without its first {trimmed} steps it does not succeed: save it whole", "save")
                 self.review()
                 return
-            episode = self.episode = shorter
+            episode = shorter  # the whole one stays, in case this one cannot be written
         if not episode.confirmed():
             self.note("error", "its actions do not lead through its states again: it is not kept", "save")
             self.discard("not reproducible", now)
@@ -325,8 +325,10 @@ class Session:
             self.store.save(self._number, recording, undos=episode.undos, wall_seconds=wall)
         except OSError as error:
             self.note("error", f"it could not be written ({error}): free disk space and save it again", "save")
+            self.driven.show(len(self.driven))
             self.review()
             return
+        self.episode = episode
         saved, wanted = len(self.store.saved), self.settings.episodes
         told = {"seed": episode.seed, "steps": len(episode), "saved": saved, "wanted": wanted}
         self.outgoing.append({"type": "saved", **told})

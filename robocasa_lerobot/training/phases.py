@@ -26,6 +26,7 @@ from robocasa_lerobot.training.setup import phase_data as joining
 from robocasa_lerobot.training.setup.build_phase import (
     check_begun,
     check_scope,
+    check_sizes,
     planned_policy,
     prepare_phase,
     start_of,
@@ -157,9 +158,12 @@ def check_phase(
     if not begun:
         if parent is None:
             builders.check_processors(config, meta)
-        if phase.statistics == "keep" and experiment.init_of(phase) != FROM_SCRATCH:
+        if experiment.init_of(phase) != FROM_SCRATCH:
             before = planned_policy(experiment, parent) if parent is not None else ({}, checkpoint)
-            check_kept_settings(config, builders.policy_config(*before, device), phase.name)
+            start = builders.policy_config(*before, device)
+            if phase.statistics == "keep":
+                check_kept_settings(config, start, phase.name)
+            check_sizes(config, start, meta, phase)
         check_scope(config, meta, phase)
     phase_evaluations(phase)
     if alone and not begun:

@@ -169,7 +169,7 @@ def test_speed_and_the_keyboards_own_axes() -> None:
 
 def test_a_phone_moves_the_hand_by_what_it_moved_while_held() -> None:
     translator = HandTranslator()
-    turn = Rotation.from_rotvec([0, 0, 0.1]).as_rotvec().tolist()
+    turn = Rotation.from_rotvec([0, 0, -0.1]).as_rotvec().tolist()
     assert translator.action(phone([0.5, 0, 0]))["eef_dx"] == 0  # the first pose is the reference
     moved = translator.action(phone([0.52, 0, -0.01], turn))
     np.testing.assert_allclose([moved["eef_dx"], moved["eef_dz"], moved["eef_rz"]], [0.4, -0.2, 0.2], atol=1e-9)
@@ -213,6 +213,22 @@ def test_a_phone_is_read_as_lerobot_reads_it() -> None:
     said(0.0)
     assert said(0.02, "B")["eef_dx"] == pytest.approx(0.4)
     assert [said(0.02)["gripper_close"], said(0.02, "A")["gripper_close"]] == [1, -1]
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_a_phone_turns_the_hand_as_it_is_turned(axis: int) -> None:
+    """About the base's forward, left and up: a phone's own first axis is the base's right, its second the front."""
+    step, translator = _phone_step(RobocasaHandConfig(device="phone")), HandTranslator()
+    turn = 0.2 * np.eye(3)[axis]
+    of_phone = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]).T
+
+    def said(moved: np.ndarray, turned: np.ndarray) -> list[float]:
+        pose = {"phone.pos": of_phone @ moved, "phone.rot": Rotation.from_rotvec(of_phone @ turned)}
+        action = translator.action(step.action({**pose, "phone.raw_inputs": {}, "phone.enabled": True}))
+        return [action[name] for name in ("eef_dx", "eef_dy", "eef_dz", "eef_rx", "eef_ry", "eef_rz")]
+
+    said(np.zeros(3), np.zeros(3))
+    np.testing.assert_allclose(said(turn / 10, turn), [*turn * 2, *turn / 0.5], atol=1e-9)
 
 
 def test_mistakes_are_explained() -> None:

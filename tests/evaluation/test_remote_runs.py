@@ -274,11 +274,14 @@ def test_a_long_first_answer_is_waited_for(tmp_path: Path) -> None:
 
 
 def test_shards_merge_when_the_server_has_gone(tmp_path: Path) -> None:
+    """Also where it was asked as two policies, through two key maps."""
+    maps = {"keys": "--policy.keys=robocasa365_pi0,robocasa365_pi05"}
     with OpenpiServer(push) as server:
+        url, two = f"{server.url},{server.url}", "--policy.label=a,b"
         for shard in ("1/2", "2/2"):
-            assert main(command(server.url, tmp_path / "out", f"--shard={shard}")) == 0
-        whole = evaluate(server.url, tmp_path / "whole")
-    assert main(command(server.url, tmp_path / "out", "--merge")) == 0
+            assert main(command(url, tmp_path / "out", f"--shard={shard}", two, **maps)) == 0
+        whole = evaluate(url, tmp_path / "whole", two, **maps)
+    assert main(command(url, tmp_path / "out", "--merge", two, **maps)) == 0
     assert comparable(read_results(tmp_path / "out")) == comparable(whole)
 
 

@@ -192,6 +192,14 @@ def test_mistakes_are_said_before_anything_runs(tmp_path: Path, changes: dict[st
     assert not (tmp_path / "out").exists()
 
 
+def test_an_adapter_that_never_answers_is_ended_with_what_it_printed(tmp_path: Path) -> None:
+    adapter = tmp_path / "slow.py"
+    adapter.write_text("import time\nprint('asking the licence server', flush=True)\ntime.sleep(60)\n")
+    message = r"(?s)no answer to 'hello' within 3 s and was ended; it last printed:\s+asking the licence server"
+    with pytest.raises(UserError, match=message):
+        evaluate(tmp_path / "out", **{"env.factory": f"{adapter}:Env", "stall_seconds": 3})
+
+
 @pytest.mark.parametrize(
     ("name", "changes", "words"),
     [

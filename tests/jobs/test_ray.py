@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import pytest
 from ray_support import StandIn
 
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.jobs import ray as ray_jobs
 from robocasa_lerobot.jobs.executors import RaySettings, add_options, execution_of
 from robocasa_lerobot.jobs.ray import run_with_ray
 
@@ -45,6 +47,31 @@ def test_pieces_run_in_the_folder_of_the_command(ray: StandIn, tmp_path: Path, m
     monkeypatch.setattr(Path, "cwd", lambda: tmp_path / "not there")
     with pytest.raises(UserError, match="give the command in a folder that all nodes share"):
         run_with_ray(Ran(), 1, tmp_path, RaySettings(), skip_complete=False)
+
+
+def test_pieces_have_the_variables_of_the_command(
+    ray: StandIn, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What the command was told by them counts on a cluster, too; a token is not among what Ray shows."""
+    monkeypatch.setenv("ROBOCASA_LEROBOT_RENDERER", "egl")
+    monkeypatch.setenv("ROBOCASA_LEROBOT_POLICY_TOKEN", "secret")
+    found: list[str | None] = []
+
+    def step(*_: Any, **__: Any) -> None:
+        found.append(os.environ.get("ROBOCASA_LEROBOT_POLICY_TOKEN"))
+
+    run = ray_jobs._run_piece
+
+    def elsewhere(*args: Any) -> None:
+        monkeypatch.delenv("ROBOCASA_LEROBOT_POLICY_TOKEN")
+        run(*args)
+
+    monkeypatch.setattr(ray_jobs, "_run_piece", elsewhere)
+    run_with_ray(step, 1, tmp_path, RaySettings())
+    told = ray.asked[-1]["runtime_env"]["env_vars"]
+    assert told["ROBOCASA_LEROBOT_RENDERER"] == "egl"
+    assert "ROBOCASA_LEROBOT_POLICY_TOKEN" not in told
+    assert found == ["secret"]
 
 
 def test_complete_pieces_run_again_where_the_step_knows_what_is_left(ray: StandIn, tmp_path: Path) -> None:

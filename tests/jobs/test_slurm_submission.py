@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import json
 import os
+import pickle
+import subprocess
+import sys
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -47,10 +51,42 @@ def test_each_array_that_was_taken_is_noted_at_once(tmp_path: Path, monkeypatch:
             submit(tmp_path, 2)
         record.unlink()
     takes(tmp_path, 3)
-    assert submit(tmp_path, 2) == ("2", "3")
+    assert submit(tmp_path, 2) == ("1,2", "3")
     assert json.loads(record.read_text()) == ["1", "2", "3"]
     script = (tmp_path / "script").read_text()  # of the last one, which waits for all arrays
     assert "--dependency=afterok:1:2\n" in script
+    assert "srun --cpus-per-task=2 " in (tmp_path / "work" / "launch_script.slurm").read_text()
+
+
+@pytest.mark.parametrize("name", ["a&b", "a b", "100%", "it's", "$HOME"])
+def test_paths_that_a_shell_would_read_otherwise_are_refused(name: str, tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="job files do not quote paths"):
+        submit(tmp_path / name, 1)
+
+
+def test_a_record_that_is_lost_or_cannot_be_written_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PATH", f"{tmp_path}{os.pathsep}{os.environ['PATH']}")
+    takes(tmp_path, 9)
+    (tmp_path / "logs").mkdir()
+    (tmp_path / "logs" / JOBS_FILE).write_text("")
+    with pytest.raises(UserError, match="found no list of jobs"):
+        submit(tmp_path, 1)
+    (tmp_path / "logs" / JOBS_FILE).unlink()
+
+    def full(path: Path, text: str) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("robocasa_lerobot.jobs.slurm.write_text", full)
+    with pytest.raises(UserError, match=r"took job 1, but .*No space left.*scancel 1"):
+        submit(tmp_path, 1)
+
+
+@pytest.mark.parametrize(("result", "status"), [(0, 0), (1, 1), (None, 0)])
+def test_the_last_jobs_status_is_what_its_function_returns(result: int | None, status: int, tmp_path: Path) -> None:
+    pickled = tmp_path / "finish.pickle"
+    pickled.write_bytes(pickle.dumps(partial(dict[str, int | None]({"status": result}).get, "status")))
+    command = [sys.executable, "-m", "robocasa_lerobot.jobs.slurm", str(pickled)]
+    assert subprocess.run(command, check=False).returncode == status
 
 
 def test_only_jobs_that_slurm_has_forgotten_are_over(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

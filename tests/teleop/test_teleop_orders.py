@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -186,7 +186,10 @@ def test_undone_steps_are_dropped_and_the_rest_replays(tmp_path: Path, env: Kitc
         assert (meta["undos"], meta["undone_steps"]) == (2, 30)
 
 
-def test_an_idle_head_is_trimmed_where_it_still_succeeds(tmp_path: Path, env: KitchenEnv, shown: Recording) -> None:
+def test_an_idle_head_is_trimmed_where_it_still_succeeds(
+    tmp_path: Path, env: KitchenEnv, shown: Recording, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And what is trimmed is whole again where it could not be written."""
     with desk(tmp_path, env, shown) as table:
         table.say("start")
         table.tick(12)
@@ -195,13 +198,27 @@ def test_an_idle_head_is_trimmed_where_it_still_succeeds(tmp_path: Path, env: Ki
             table.say("action", frame=0, action=action.tolist())
             table.tick()
         assert table.session.driven.idle_head() == 10
-        assert len(table.session.driven) == 10 + len(shown.actions)
+        whole = table.session.driven
+        with monkeypatch.context() as full:
+            full.setattr(table.session.store, "save", raises(OSError(28, "No space left on device")))
+            table.say("save", trim=True)
+            table.until("review")
+        assert table.session.driven is whole
+        assert len(whole) == 10 + len(shown.actions)
         table.say("save", trim=True)
         table.until("done")
     found = replay(tmp_path / f"{TASK}.hdf5", "demo_0")
     assert (found.actions, found.same_start, found.deviation) == (True, True, 0.0)
     with h5py.File(tmp_path / f"{TASK}.hdf5") as file:
         assert np.array_equal(file["data/demo_0/actions"], shown.actions)
+        assert json.loads(file["data/demo_0"].attrs["ep_meta"])["teleop"]["trimmed_steps"] == 10
+
+
+def raises(error: Exception) -> Callable[..., Any]:
+    def call(*_: Any, **__: Any) -> Any:
+        raise error
+
+    return call
 
 
 def test_nothing_counts_before_the_first_input(tmp_path: Path, env: KitchenEnv, shown: Recording) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 from robocasa_lerobot.evaluation.actors.actor import ChunkActor, ChunkReply, ChunkRequest, ChunkShape
@@ -28,7 +29,8 @@ class RemoteActor(ChunkActor):
 
     def __init__(self, label: str, policy: RemotePolicy, waiting: Waiting) -> None:
         self._policy, self._key_map = policy, policy.key_map
-        self._client = connect(policy.address, policy.timeouts, waiting, os.environ.get(TOKEN_VARIABLE))
+        patience = replace(policy.timeouts, introduction=policy.timeouts.first_answer)  # it may compile for another
+        self._client = connect(policy.address, patience, waiting, os.environ.get(TOKEN_VARIABLE))
         shape = ChunkShape(executed=self._key_map.executed_steps, offsets=self._key_map.offsets)
         super().__init__(label, shape, self._ask)
 

@@ -45,7 +45,7 @@ def open_sources(config: EvaluationConfig, ask: bool = True) -> tuple[list[Polic
             address, key_map = parse_address(path), next(keys)
             label = label or default_label(address)
             if not ask:
-                sources.append(_known(label, _recorded(address, recorded)))
+                sources.append(_known(label, _recorded(label, address, recorded)))
                 continue
             patience = patience_of(config.remote)
             introduction = asked[place] = Introduction(address, key_map, config.executed_steps, patience)
@@ -81,11 +81,15 @@ def recorded_device(out: Path) -> str | None:
     return next((header.device for header in _recorded_headers(out)), None)
 
 
-def _recorded_remotes(out: Path) -> dict[str, Described]:
-    """What the headers in a results folder and in those of its shards say of policies behind sockets, by address."""
-    found: dict[str, Described] = {}
+def _recorded_remotes(out: Path) -> dict[tuple[str, str], Described]:
+    """What the headers in a results folder and in those of its shards say of policies behind sockets.
+
+    By label and address: one server may be asked through two key maps.
+    """
+    found: dict[tuple[str, str], Described] = {}
     for header in _recorded_headers(out):
-        found |= {info.path: info.remote for info in header.policies.values() if info.remote is not None}
+        known = header.policies.items()
+        found |= {(label, info.path): info.remote for label, info in known if info.remote is not None}
     return found
 
 
@@ -94,10 +98,11 @@ def _recorded_headers(out: Path) -> Iterator[RunHeader]:
         yield from read_results(file).headers.values()
 
 
-def _recorded(address: Address, recorded: Mapping[str, Described]) -> RemotePolicy:
-    if address.text not in recorded:
-        raise UserError(f"no results of a run with {address.text}; found {', '.join(recorded) or 'none'}.")
-    return RemotePolicy.recorded(address, recorded[address.text])
+def _recorded(label: str, address: Address, recorded: Mapping[tuple[str, str], Described]) -> RemotePolicy:
+    if (label, address.text) not in recorded:
+        known = ", ".join(f"{name} ({where})" for name, where in recorded)
+        raise UserError(f"no results of a run with {label} ({address.text}); found {known or 'none'}.")
+    return RemotePolicy.recorded(address, recorded[label, address.text])
 
 
 def _known(label: str, remote: RemotePolicy) -> PolicySource:

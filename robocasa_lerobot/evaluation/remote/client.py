@@ -16,12 +16,19 @@ TOKEN_VARIABLE = "ROBOCASA_LEROBOT_POLICY_TOKEN"
 class Timeouts:
     """Seconds: until somebody listens and has introduced itself, for an answer, and for the first one.
 
-    The first answer has its own, because servers compile on their first request, some for many minutes.
+    The first answer has its own, because servers compile on their first request, some for many minutes. Who asks a
+    server that others ask as well gives `introduction` as long: it may be compiling for one of them.
     """
 
     connect: float = 60.0
     answer: float = 120.0
     first_answer: float = 900.0
+    introduction: float = 0.0
+
+    @property
+    def introduced(self) -> float:
+        """Until somebody who listens has introduced itself."""
+        return max(self.connect, self.introduction)
 
 
 def do_nothing() -> None:

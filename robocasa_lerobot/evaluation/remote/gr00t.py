@@ -68,7 +68,7 @@ class Gr00tClient:
         self._monitor = self._socket.get_monitor_socket(zmq.EVENT_DISCONNECTED)
         self._socket.connect(f"tcp://{address.host}:{address.port}")
         try:
-            said = self._ask({"endpoint": "ping"}, timeouts.connect)
+            said = self._ask({"endpoint": "ping"}, timeouts.introduced)
             config, version = self._modality_config()
         except ServerSaidError as error:
             self.close()

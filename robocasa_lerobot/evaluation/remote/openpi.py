@@ -27,23 +27,24 @@ class OpenpiClient:
         self, address: Address, timeouts: Timeouts, waiting: Waiting = do_nothing, token: str | None = None
     ) -> None:
         self._address, self._timeouts, self._answered = address, timeouts, False
-        self._socket = WebSocket(address, timeouts.connect, waiting, token)
+        self._socket = WebSocket(address, timeouts.connect, waiting, token, timeouts.introduced)
         try:
-            self.metadata = self._receive(timeouts.connect)
+            self.metadata = self._receive(timeouts.introduced)
         except LostError as error:
             raise LostError(f"{error}: an openpi server sends its metadata first; is it one?") from error
 
     def infer(self, observation: Mapping[str, Any]) -> dict[str, Any]:
         """The answer to an observation; see `PolicyClient`."""
-        self._socket.send(encode(dict(observation), "openpi"))
-        answer = self._receive(self._timeouts.answer if self._answered else self._timeouts.first_answer)
+        seconds = self._timeouts.answer if self._answered else self._timeouts.first_answer
+        self._socket.send(encode(dict(observation), "openpi"), seconds)
+        answer = self._receive(seconds)
         self._answered = True
         return answer
 
     def reset(self, message: Mapping[str, Any] | None = None) -> None:
         """Nothing on the wire, but for servers whose key map has a reset message: any answer to it will do."""
         if message:
-            self._socket.send(encode(dict(message), "openpi"))
+            self._socket.send(encode(dict(message), "openpi"), self._timeouts.answer)
             self._socket.receive(self._timeouts.answer)
 
     def close(self) -> None:

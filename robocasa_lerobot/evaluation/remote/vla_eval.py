@@ -32,10 +32,10 @@ class VlaEvalClient:
     ) -> None:
         self._address, self._timeouts, self._answered = address, timeouts, False
         self._number, self._in_episode = 0, False
-        self._socket = WebSocket(address, timeouts.connect, waiting, token)
+        self._socket = WebSocket(address, timeouts.connect, waiting, token, timeouts.introduced)
         hello = {"harness_version": HARNESS, "protocol_version": PROTOCOL_VERSION, "benchmark": HARNESS}
         try:
-            self.metadata = self._answer(self._send("hello", hello), "hello", timeouts.connect)
+            self.metadata = self._answer(self._send("hello", hello), "hello", timeouts.introduced)
         except LostError as error:
             raise LostError(f"{error}: a vla_eval server answers a hello; is it one?") from error
 
@@ -44,8 +44,7 @@ class VlaEvalClient:
         if not self._in_episode:
             self.reset()
         number = self._send("observation", dict(observation))
-        seconds = self._timeouts.answer if self._answered else self._timeouts.first_answer
-        answer = self._answer(number, "action", seconds)
+        answer = self._answer(number, "action", self._seconds)
         self._answered = True
         return answer
 
@@ -60,10 +59,14 @@ class VlaEvalClient:
         """End the connection."""
         self._socket.close()
 
+    @property
+    def _seconds(self) -> float:
+        return self._timeouts.answer if self._answered else self._timeouts.first_answer
+
     def _send(self, kind: str, payload: dict[str, Any]) -> int:
         self._number += 1
         message = {"type": kind, "payload": payload, "seq": self._number, "timestamp": time.time()}
-        self._socket.send(encode(message, "vla_eval"))
+        self._socket.send(encode(message, "vla_eval"), self._seconds)
         return self._number
 
     def _answer(self, number: int, kind: str, seconds: float) -> dict[str, Any]:

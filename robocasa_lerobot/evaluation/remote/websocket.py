@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import socket
+import threading
 import time
 from contextlib import suppress
 
@@ -18,7 +19,8 @@ from robocasa_lerobot.wire.codec import MAX_MESSAGE_BYTES
 _HANDSHAKE_SECONDS = 20.0  # of one try: a server that computes in its event loop lets newcomers wait
 _RETRY_SECONDS = 0.25
 _UNAUTHORIZED = (401, 403)
-_NO_PLACE = 503  # others are served, or what the server needs is not there yet
+# Others are served, or what the server needs is not there yet; a proxy before it finds nobody, or nobody who answers.
+_NOT_NOW = (502, 503, 504)
 _SHOWN = 200  # characters of what an answer says; a proxy sends whole pages
 
 
@@ -32,26 +34,49 @@ class WebSocket:
         seconds: for how long it is tried again while nobody listens, or the server has no place.
         waiting: called every now and then.
         token: sent as `Authorization: Api-Key ...`; None sends nothing.
+        busy_seconds: for how long while somebody listens and does not answer the handshake, if that is longer.
 
     Raises:
         LostError: nobody listened or answered the handshake in time, or the server had no place.
         UserError: the server wants a token, or is no websocket server.
     """
 
-    def __init__(self, address: Address, seconds: float, waiting: Waiting, token: str | None) -> None:
+    def __init__(
+        self, address: Address, seconds: float, waiting: Waiting, token: str | None, busy_seconds: float = 0.0
+    ) -> None:
         self._address, self._waiting = address, waiting
-        self._connection = self._connect(seconds, {"Authorization": f"Api-Key {token}"} if token else None)
+        headers = {"Authorization": f"Api-Key {token}"} if token else None
+        self._connection = self._connect(seconds, max(seconds, busy_seconds), headers)
 
-    def send(self, frame: bytes) -> None:
+    def send(self, frame: bytes, seconds: float) -> None:
         """Send a binary frame.
 
         Raises:
-            LostError: the connection has ended.
+            LostError: it was not taken within `seconds`, as by a server that computes and does not read what is larger
+                than the system's buffers; or the connection has ended.
         """
-        try:
-            self._connection.send(frame)
-        except (ConnectionClosed, OSError) as error:
-            raise self._ended(error) from error
+        failed: list[Exception] = []
+
+        def work() -> None:  # which has no time limit of its own
+            try:
+                self._connection.send(frame)
+            except Exception as error:
+                failed.append(error)
+
+        deadline, sending = _now() + seconds, threading.Thread(target=work, daemon=True)
+        sending.start()
+        while True:
+            sending.join(min(POLL_SECONDS, max(0.0, deadline - _now())))
+            if not sending.is_alive():
+                break
+            self._waiting()
+            if _now() >= deadline:
+                self.close()
+                raise LostError(f"{self._address.text}: timed out, a request was not taken within {seconds:g} s")
+        if failed:
+            if isinstance(failed[0], ConnectionClosed | OSError):
+                raise self._ended(failed[0]) from failed[0]
+            raise failed[0]
 
     def receive(self, seconds: float) -> bytes | str:
         """The next frame.
@@ -80,10 +105,9 @@ class WebSocket:
         with suppress(Exception):
             self._connection.close()
 
-    def _connect(self, seconds: float, headers: dict[str, str] | None) -> ClientConnection:
-        deadline = time.monotonic() + seconds
+    def _connect(self, seconds: float, busy_seconds: float, headers: dict[str, str] | None) -> ClientConnection:
+        began = _now()
         while True:
-            left = max(0.1, deadline - _now())
             try:
                 return connect(
                     self._address.websocket,
@@ -91,19 +115,29 @@ class WebSocket:
                     compression=None,
                     max_size=MAX_MESSAGE_BYTES,
                     ping_interval=None,
-                    open_timeout=min(left, _HANDSHAKE_SECONDS),
+                    open_timeout=min(max(0.1, began + busy_seconds - _now()), _HANDSHAKE_SECONDS),
                     close_timeout=1.0,
                     proxy=None,
                 )
-            except socket.gaierror as error:
-                raise LostError(f"{self._address.text}: unknown host ({error})") from error
             except (OSError, TimeoutError, WebSocketException) as error:
-                if isinstance(error, InvalidStatus) and error.response.status_code != _NO_PLACE:
+                if isinstance(error, socket.gaierror) and error.errno != socket.EAI_AGAIN:
+                    raise LostError(f"{self._address.text}: unknown host ({error})") from error
+                if isinstance(error, InvalidStatus) and error.response.status_code not in _NOT_NOW:
                     raise self._unwanted(error) from error
                 self._waiting()
-                if _now() + _RETRY_SECONDS >= deadline:
-                    raise LostError(f"{self._address.text}: {_why(error)}; tried for {seconds:g} s") from error
+                busy = isinstance(error, TimeoutError) and self._listens()
+                tried = busy_seconds if busy else seconds
+                if _now() + _RETRY_SECONDS >= began + tried:
+                    raise LostError(f"{self._address.text}: {_why(error)}; tried for {tried:g} s") from error
                 time.sleep(_RETRY_SECONDS)
+
+    def _listens(self) -> bool:
+        """Whether somebody takes connections there, whatever they do with them."""
+        try:
+            socket.create_connection((self._address.host.strip("[]"), self._address.port), timeout=5.0).close()
+        except OSError:
+            return False
+        return True
 
     def _unwanted(self, error: InvalidStatus) -> UserError:
         status = error.response.status_code

@@ -26,7 +26,7 @@ def plan_simulator(
     """
     _check(simulator, config, sources)
     tasks = list(config.env.tasks)
-    description = describe(simulator, tasks)
+    description = describe(simulator, tasks, config.stall_seconds)
     settings["simulator"] = description.settings()
     settings["split"] = OWN_SCENES
     if config.env.type is not None:

@@ -70,6 +70,7 @@ class ForeignProcess:
             os.close(their_read)
             os.close(their_write)
         self._questions, self._answers = os.fdopen(our_write, "wb"), os.fdopen(our_read, "rb")
+        self._ended_because: str | None = None
         self._printed: collections.deque[str] = collections.deque(maxlen=_KEPT_LINES)
         assert self._process.stdout is not None
         self._reader = threading.Thread(target=self._drain, args=(self._process.stdout,), daemon=True)
@@ -79,6 +80,25 @@ class ForeignProcess:
     def pid(self) -> int:
         """Of the foreign process."""
         return self._process.pid
+
+    def ask_within(self, seconds: float, name: str, **message: Any) -> tuple[dict[str, Any], Arrays]:
+        """As `ask`, where no worker pool watches: a process that has not answered within so many seconds is ended.
+
+        Raises:
+            EnvRaisedError, SimulatorError: as for `ask`, and where it was.
+        """
+
+        def end() -> None:
+            self._ended_because = f"gave no answer to {name!r} within {seconds:g} s and was ended"
+            self._process.kill()
+
+        out_of_time = threading.Timer(seconds, end)
+        out_of_time.daemon = True
+        out_of_time.start()
+        try:
+            return self.ask(name, **message)
+        finally:
+            out_of_time.cancel()
 
     def ask(self, name: str, arrays: Arrays | None = None, **message: Any) -> tuple[dict[str, Any], Arrays]:
         """The answer to a question; it waits as long as it takes, and the worker pool ends what takes too long.
@@ -129,7 +149,9 @@ class ForeignProcess:
             self._process.wait(_END_SECONDS)
         code = self._process.poll()
         self._reader.join(1.0)
-        if code is None:
+        if self._ended_because is not None:
+            how = self._ended_because
+        elif code is None:
             how = "closed its pipe"
         elif code < 0:
             how = f"was ended by {signal.Signals(-code).name}"

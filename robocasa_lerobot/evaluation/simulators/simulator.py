@@ -68,17 +68,19 @@ def simulator_of(python: str | None, kind: str | None, factory: str, options: di
     return Simulator(str(Path(python).absolute()) if python else sys.executable, factory, options)
 
 
-def describe(simulator: Simulator, tasks: Sequence[str]) -> Description:
+def describe(simulator: Simulator, tasks: Sequence[str], seconds: float) -> Description:
     """Ask a simulator about itself, in a process that ends with the answer.
 
     Raises:
-        UserError: its interpreter or adapter does not work, or it does not have a task.
+        UserError: its interpreter or adapter does not work, or does not answer within so many seconds, or it does not
+            have a task.
     """
     where = f"env.python {simulator.python}, env.factory {Path(simulator.factory).name}"
     try:
         process = ForeignProcess(simulator.python)
         try:
-            said, _ = process.ask("hello", factory=simulator.factory, options=simulator.options, tasks=list(tasks))
+            question = {"factory": simulator.factory, "options": simulator.options, "tasks": list(tasks)}
+            said, _ = process.ask_within(seconds, "hello", **question)
         finally:
             process.close()
         if said["protocol"] != PROTOCOL:

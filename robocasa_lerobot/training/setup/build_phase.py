@@ -196,6 +196,41 @@ def check_scope(config: PreTrainedConfig, meta: MixtureMeta, phase: PhaseConfig)
     trained_parameters(policy, phase)
 
 
+def check_sizes(config: PreTrainedConfig, before: PreTrainedConfig, meta: MixtureMeta, phase: PhaseConfig) -> None:
+    """Whether the weights that a phase starts from have the sizes of its own, both policies built without them.
+
+    Those that cannot be built so are not looked at: the phase will say.
+
+    Raises:
+        UserError: the phase changes settings of the policy that its weights go by.
+    """
+    changed = [key for key in phase.policy if key not in (RENAME, LEAVE_OUT, "type")]
+    if not changed:
+        return
+    try:
+        ours, theirs = (_sizes(of, meta) for of in (config, before))
+    except Exception:  # as where packages are missing
+        return
+    differ = [name for name in ours.keys() | theirs.keys() if ours.get(name) != theirs.get(name)]
+    if differ:
+        name, settings = min(differ), ", ".join(f"policy.{key}" for key in changed)
+        raise UserError(
+            f"phase {phase.name!r} sets {settings}, with which {len(differ)} of the weights that it starts from do not "
+            f"fit: {name} has {_size(theirs.get(name))} there, and "
+            f"{_size(ours.get(name))} here. Leave settings that change sizes to the policy it starts from, or set "
+            f"`init: {FROM_SCRATCH}`."
+        )
+
+
+def _sizes(config: PreTrainedConfig, meta: MixtureMeta) -> dict[str, tuple[int, ...]]:
+    policy = builders.policy_without_weights(config, meta)
+    return {name: tuple(weight.shape) for name, weight in policy.named_parameters()}
+
+
+def _size(size: tuple[int, ...] | None) -> str:
+    return " x ".join(map(str, size)) or "one number" if size is not None else "none"
+
+
 def phase_seed(seed: int, name: str) -> int:
     """The seed of a phase: no two phases of an experiment see the same noise or sample order."""
     return int.from_bytes(hashlib.sha256(f"{seed}/{name}".encode()).digest()[:4], "big")
@@ -205,7 +240,7 @@ def policy_settings(experiment: ExperimentConfig, phase: PhaseConfig) -> dict[st
     """What the policy's configuration is made of, or what changes in the checkpoint's it starts from.
 
     Raises:
-        UserError: the phase starts from scratch, and no type of policy is given.
+        UserError: the phase starts from scratch, and no type of policy is given, or it names inputs of weights.
     """
     init = experiment.init_of(phase)
     own = experiment.policy if experiment.parent(phase) is None else {}  # a phase before has them already
@@ -219,6 +254,13 @@ def policy_settings(experiment: ExperimentConfig, phase: PhaseConfig) -> dict[st
         settings.pop("path", None)
         if "type" not in settings:
             raise UserError(f"phase {phase.name!r} starts {FROM_SCRATCH}, so `policy` needs a `type`.")
+        for key in (RENAME, LEAVE_OUT):  # the experiment's are for those of its phases that have weights
+            if phase.policy.get(key):
+                raise UserError(
+                    f"phase {phase.name!r} sets policy.{key}, which says what inputs of weights are in the data, and "
+                    f"starts {FROM_SCRATCH}, with the inputs of the data: leave it away, or give weights in `init`. "
+                    "Cameras of the data are left out by `loader.cameras`."
+                )
     return settings
 
 
