@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robocasa_lerobot.data.mixture_config import MemberConfig, MixtureConfig
-from robocasa_lerobot.data.reading.decisions import NoFramesError, frame_pool, frames_of, last_of_runs
+from robocasa_lerobot.data.reading.decisions import NoFramesError, ends_of_runs, frame_pool, frames_of
 from robocasa_lerobot.data.reading.source import DatasetSource
 
 
@@ -25,7 +25,7 @@ class Member:
         frames: how many frames may start a sample.
         kind: of `contract.FRAME_KINDS`, which these are; None: all.
         wanted: of each frame of the dataset, whether it is of that kind.
-        last: of each frame of the dataset, the last one of its run of this kind.
+        run: of each frame of the dataset, the first and the last one of its run of this kind.
     """
 
     source: DatasetSource
@@ -33,7 +33,7 @@ class Member:
     frames: int
     kind: str | None = None
     wanted: NDArray[np.bool_] | None = None
-    last: NDArray[np.int64] | None = None
+    run: tuple[NDArray[np.int64], NDArray[np.int64]] | None = None
 
 
 def with_frames(config: MixtureConfig, opened: Mapping[Path, DatasetSource]) -> tuple[MixtureConfig, list[Member]]:
@@ -55,8 +55,8 @@ def with_frames(config: MixtureConfig, opened: Mapping[Path, DatasetSource]) -> 
             lacking = f"no frame is left with frames={kind} in {len(episodes)} episodes."
             without.append(NoFramesError(f"{source.root}: {lacking}"))
             continue
-        last = None if wanted is None else last_of_runs(source, wanted)
-        kept.append((member, Member(source, episodes, frames, kind, wanted, last)))
+        run = None if wanted is None else ends_of_runs(source, wanted)
+        kept.append((member, Member(source, episodes, frames, kind, wanted, run)))
     if not kept:
         raise without[0]
     return dataclasses.replace(config, members=[member for member, _ in kept]), [one for _, one in kept]

@@ -308,19 +308,23 @@ class MixtureDataset(torch.utils.data.Dataset[Item]):
         return source
 
     def _bounds(self, source: DatasetSource, frames: NDArray[np.int64], members: NDArray[np.int64]) -> Bounds:
-        """Of the windows around frames: their episodes, and where a kind of frame is drawn, the end of its run."""
+        """Of the windows around frames: their episodes, and where a kind of frame is drawn, its run."""
         episode = source.columns["episode_index"][frames]
-        last = source.ends[episode] - 1
+        starts, last = source.starts[episode], source.ends[episode] - 1
+        first = starts
         for number in np.unique(members).tolist():
-            if (runs := self._members[number].last) is not None:
-                last = np.where(members == number, runs[frames], last)
-        return Bounds(source.starts[episode], last)
+            if (run := self._members[number].run) is not None:
+                first = np.where(members == number, run[0][frames], first)
+                last = np.where(members == number, run[1][frames], last)
+        return Bounds(starts, last, first)
 
     def _window(
         self, key: str, frames: NDArray[np.int64], bounds: Bounds
     ) -> tuple[NDArray[np.int64], NDArray[np.bool_] | None]:
         """Dataset indices of a key's window, (n,) or (n, time), and where it is out of bounds."""
-        return (frames, None) if key not in self._deltas else bounds.window(frames, self._deltas[key])
+        if key not in self._deltas:
+            return frames, None
+        return bounds.window(frames, self._deltas[key], of_actions=key == contract.ACTION_KEY)
 
 
 def check_share(batch_size: int, processes: int) -> None:

@@ -83,17 +83,20 @@ def test_what_says_nothing_has_no_such_frames(data: Path) -> None:
 
 
 def test_actions_end_where_somebody_else_decides(data: Path) -> None:
-    """The policy's steps, 0 to 2, come before the person's, 3 to 5."""
+    """And begin: the policy's steps, 0 to 2, come before the person's, 3 to 5. What was seen before still is."""
     dataset = mixture(data)
-    dataset.set_windows({"action": [t / dataset.meta.fps for t in range(-1, 3)]})
-    members, frames = np.array([0, 1, 2, 2]), np.array([1, 4, LENGTH, LENGTH + 1])
+    windows = {"action": range(-1, 3), "observation.state": range(-1, 1)}
+    dataset.set_windows({key: [t / dataset.meta.fps for t in steps] for key, steps in windows.items()})
+    members, frames = np.array([0, 1, 2, 2, 1]), np.array([1, 4, LENGTH, LENGTH + 1, 3])
     batch = dataset.batch(members, frames)
     assert batch["action_is_pad"].tolist() == [
         [False, False, False, False],  # whoever decides
         [False, False, False, True],  # to the end of the episode
         [True, False, False, False],
         [False, False, False, True],  # what follows is not the policy's
+        [True, False, False, False],  # what came before is not the person's
     ]
+    assert not batch["observation.state_is_pad"][4].any()
     everything = dataset.sources[data / "corrected"].columns["action"]
     for row, indices in ((1, [3, 4, 5, 5]), (3, [LENGTH, LENGTH + 1, LENGTH + 2, LENGTH + 2])):
         assert np.array_equal(batch["action"][row], everything[indices])

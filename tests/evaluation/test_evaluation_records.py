@@ -293,6 +293,9 @@ def test_bad_checkpoints_are_explained(tmp_path: Path) -> None:
     (good / "model.safetensors").unlink()
     with pytest.raises(UserError, match="the checkpoint is incomplete"):
         checkpoints.read_source(str(good))
+    (good / "adapter_model.safetensors").touch()
+    with pytest.raises(UserError, match=r"adapter of PEFT alone .*merge_and_unload"):
+        checkpoints.read_source(str(good))
 
 
 def test_policies_of_different_picture_sizes_do_not_share_an_evaluation(tmp_path: Path) -> None:

@@ -19,7 +19,14 @@ from robocasa_lerobot import contract
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.policies.common.attention import short_attention
 from robocasa_lerobot.policies.common.images import center_crop, crop_size, random_crop, resize, to_signed_float
-from robocasa_lerobot.policies.common.language import PADDING, SUBWORDS, TokenEncoder, hashed_words, token_tensor
+from robocasa_lerobot.policies.common.language import (
+    PADDING,
+    SUBWORDS,
+    ClipTextEncoder,
+    TokenEncoder,
+    hashed_words,
+    token_tensor,
+)
 from robocasa_lerobot.policies.common.language_processor import ClipTokensStep
 from robocasa_lerobot.policies.common.statistics import leave_components, widen_constant_components
 from robocasa_lerobot.policies.common.vision import ConvNet, FeatureGrid, SpatialSoftmax
@@ -273,6 +280,16 @@ def clip_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     )  # fmt: skip
     CLIPTextModelWithProjection(config).save_pretrained(folder)
     return folder
+
+
+def test_a_clip_in_half_precision_is_held_as_checkpoints_hold_it(clip_folder: Path, tmp_path: Path) -> None:
+    from transformers import CLIPTextModelWithProjection
+
+    half = tmp_path / "half"
+    CLIPTextModelWithProjection.from_pretrained(clip_folder).half().save_pretrained(half)
+    for saved in (True, False):
+        encoder = ClipTextEncoder(str(half), None, saved)
+        assert {p.dtype for p in encoder.text_model.parameters()} == {torch.float32}
 
 
 @pytest.mark.parametrize("saved", [True, False])

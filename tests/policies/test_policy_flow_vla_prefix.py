@@ -205,6 +205,11 @@ def test_checkpoint_with_pretrained_prefix_needs_no_other_file(kind: str, tmp_pa
     config = pretrained_config(model, prefix_layers=2, freeze_vision=True, frozen_dtype="bfloat16")
     policy, preprocess, postprocess = build(config)
     assert policy.prefix.shape["layers"] == len(policy.expert.layers) == 2
+    exact, _, _ = build(pretrained_config(model, prefix_layers=2))
+    buffers = dict(policy.prefix.named_buffers())
+    assert any("inv_freq" in name for name in buffers)
+    for name, value in exact.prefix.named_buffers():  # frequencies of positions are no weights
+        assert torch.equal(buffers[name], value), name
     assert config.prefix_config is None  # only a checkpoint has it: this object would load weights again
     preprocess(batch_for(config))
     model.rename(tmp_path / "elsewhere")

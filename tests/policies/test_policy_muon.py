@@ -50,6 +50,19 @@ def new() -> Net:
     return Net()
 
 
+def test_what_has_matrices_alone_is_moved_too() -> None:
+    """As where a phase trains low-rank changes of attention and nothing else."""
+    net = new()
+    optimizer = MuonConfig().build({"linear.weight": net.linear.weight})
+    before = net.linear.weight.detach().clone()
+    for _ in gradients(net, 2):
+        optimizer.step()
+    assert not torch.equal(net.linear.weight, before)
+    again = MuonConfig().build({"linear.weight": net.linear.weight})
+    again.load_state_dict(optimizer.state_dict())
+    assert again.state_dict()["state"].keys() == {0}
+
+
 def test_matrices_and_the_rest_go_as_with_pytorchs_own_optimisers() -> None:
     ours, theirs = new(), new()
     settings = MuonConfig(lr=2e-3, matrix_lr=0.03, momentum=0.9, betas=(0.8, 0.9), weight_decay=0.1)

@@ -38,17 +38,18 @@ def frames_of(source: DatasetSource, kind: str) -> NDArray[np.bool_]:
     return person if kind == INTERVENTIONS else ~person
 
 
-def last_of_runs(source: DatasetSource, wanted: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """For each `wanted` frame (frames,) of a dataset the last one of those that follow it without a gap; else itself.
+def ends_of_runs(source: DatasetSource, wanted: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """For each `wanted` frame (frames,) of a dataset the first and last ones around it without a gap; else itself.
 
-    What comes after it, somebody else has decided: actions that are learned from a kind of frame end there.
+    What is outside, somebody else has decided: actions that are learned from a kind of frame stay within.
     """
     goes_on = np.zeros(len(wanted), dtype=np.bool_)
     goes_on[:-1] = wanted[:-1] & wanted[1:]
     goes_on[source.ends - 1] = False
-    ends = np.flatnonzero(~goes_on)
-    last: NDArray[np.int64] = ends[np.searchsorted(ends, np.arange(len(wanted)))]
-    return last
+    ends, frames = np.flatnonzero(~goes_on), np.arange(len(wanted))
+    starts = np.concatenate([[0], ends[:-1] + 1])
+    run = np.searchsorted(ends, frames)
+    return starts[run], ends[run]
 
 
 def frame_pool(

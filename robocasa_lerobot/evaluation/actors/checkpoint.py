@@ -21,7 +21,7 @@ REPLAY = "replay"  # written replay:FILE
 _ABOUT_TRAINING = ("train_config.json", ORIGIN_FILE)
 _PREPROCESSOR, _RENAMES = "policy_preprocessor.json", "rename_observations_processor"  # LeRobot's names
 _PICTURE_PREFIX = "observation.image"
-_WEIGHTS = ("model.safetensors", "adapter_model.safetensors")
+_WEIGHTS, _ADAPTER = "model.safetensors", "adapter_model.safetensors"
 
 
 class CheckpointError(UserError):
@@ -127,14 +127,23 @@ def find_pretrained(path: Path) -> Path:
     """The `pretrained_model` folder at `path`, at a checkpoint, or under the last checkpoint of a phase."""
     for candidate in (path, path / "pretrained_model", path / "checkpoints" / "last" / "pretrained_model"):
         if (candidate / "config.json").is_file():
-            if not any((candidate / name).is_file() for name in _WEIGHTS):
-                raise CheckpointError(f"{candidate}: config.json without {_WEIGHTS[0]}: the checkpoint is incomplete.")
+            if not (candidate / _WEIGHTS).is_file():
+                raise CheckpointError(f"{candidate}: config.json without {_WEIGHTS}: {_incomplete(candidate)}")
             return candidate
     what = "has no config.json" if path.is_dir() else "no such folder"
     found = sorted(str(p.parent) for p in path.glob("**/pretrained_model/config.json"))[:3] if path.is_dir() else []
     hint = f" Did you mean {' or '.join(found)}?" if found else ""
     known = ", ".join((*REFERENCE_POLICIES, "replay:FILE", "openpi://HOST:PORT", "gr00t://...", "vla_eval://..."))
     raise CheckpointError(f"policy.path {path}: {what}; expected a pretrained_model folder, or one of {known}.{hint}")
+
+
+def _incomplete(folder: Path) -> str:
+    if (folder / _ADAPTER).is_file():
+        return (
+            f"it holds an adapter of PEFT alone ({_ADAPTER}). Merge it into its policy and save that: "
+            "`PeftModel.from_pretrained(policy, folder).merge_and_unload().save_pretrained(...)`."
+        )
+    return "the checkpoint is incomplete."
 
 
 def fingerprint(folder: Path) -> str:

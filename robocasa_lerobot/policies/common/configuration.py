@@ -46,7 +46,7 @@ class ActionChunkConfig(PreTrainedConfig):
 
     # Hashed words, where they are how instructions are read.
     language_buckets: int = 8192
-    max_words: int = 32
+    max_words: int = 64  # holds every instruction of the 365 tasks
 
     # Loss.
     mask_padded_actions: bool = True  # actions outside the episode do not count

@@ -50,6 +50,11 @@ def hashed_words(text: str, max_words: int, buckets: int) -> tuple[tuple[int, ..
     return tuple(_hashed_word(word, buckets) for word in words)
 
 
+def count_words(text: str) -> int:
+    """How many words an instruction has; signs count as such."""
+    return len(_WORD.findall(text.lower()))
+
+
 def _hashed_word(word: str, buckets: int) -> tuple[int, ...]:
     marked = f"<{word}>"
     pieces = [marked, *(marked[i : i + 3] for i in range(len(marked) - 2) if len(marked) > 3)][:SUBWORDS]
@@ -185,9 +190,11 @@ class ClipTextEncoder(nn.Module):
 
 def _from_pretrained(cls: Any, path: str, what: str, config: Any = None) -> Any:
     try:
-        if config is not None and without_weights():
+        if config is None:
+            return cls.from_pretrained(path)
+        if without_weights():
             return cls(config.from_pretrained(path))
-        return cls.from_pretrained(path)
+        return cls.from_pretrained(path, dtype="float32")  # as it is held in checkpoints, whatever the file's is
     except (OSError, ValueError) as error:
         kind = "folder" if Path(path).exists() else "hub name or folder"
         raise UserError(

@@ -64,7 +64,7 @@ class _InstructionStep(ObservationProcessorStep):
 class HashedWordsStep(_InstructionStep):
     """Tokens of `TokenEncoder`: (B, max_words, SUBWORDS) int64, and (B, max_words) bool."""
 
-    max_words: int = 32
+    max_words: int = 64
     buckets: int = 8192
 
     def tokenize(self, instructions: list[str]) -> tuple[Tensor, Tensor]:

@@ -39,7 +39,8 @@ class MuonAdamW(torch.optim.Optimizer):
 
     def __init__(self, groups: list[dict[str, Any]]) -> None:
         super().__init__(groups, {})
-        self._adamw = torch.optim.AdamW([group for group in self.param_groups if not group["matrices"]])
+        others = [group for group in self.param_groups if not group["matrices"]]
+        self._adamw = torch.optim.AdamW(others) if others else None
         self._share()
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -47,6 +48,8 @@ class MuonAdamW(torch.optim.Optimizer):
         self._share()
 
     def _share(self) -> None:
+        if self._adamw is None:
+            return
         self._adamw.state = self.state
         self._adamw.param_groups = [group for group in self.param_groups if not group["matrices"]]
 
@@ -60,7 +63,8 @@ class MuonAdamW(torch.optim.Optimizer):
         for group in self.param_groups:
             if group["matrices"]:
                 self._orthogonal_step(group)
-        self._adamw.step()
+        if self._adamw is not None:
+            self._adamw.step()
         return loss
 
     def _orthogonal_step(self, group: dict[str, Any]) -> None:

@@ -127,7 +127,8 @@ class Prefix(nn.Module, ABC):
         for part, frozen in (("vision", self.config.freeze_vision), ("language", self.config.freeze_language)):
             for module in self.parts()[part] if frozen else ():
                 module.requires_grad_(False)
-                module.to(getattr(torch, self.config.frozen_dtype))
+                for parameter in module.parameters():  # not buffers: frequencies of positions stay exact
+                    parameter.data = parameter.data.to(getattr(torch, self.config.frozen_dtype))
         self.train(self.training)
 
     def train(self, mode: bool = True) -> Prefix:

@@ -25,6 +25,7 @@ from robocasa_lerobot.data.mixture import MixtureDataset, MixtureMeta
 from robocasa_lerobot.data.mixture_config import LoaderConfig, MemberConfig, MixtureConfig
 from robocasa_lerobot.data.registry.registry import missing_datasets
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.policies.cut_instructions import cut_instructions
 from robocasa_lerobot.training.config.experiment import FROM_SCRATCH, ExperimentConfig, PhaseConfig
 from robocasa_lerobot.training.loop import PhaseRun, train_phase
 from robocasa_lerobot.training.metrics import METRICS, read_lines
@@ -171,7 +172,9 @@ def _plan_data(loader: LoaderConfig, dataset: MixtureDataset, size: tuple[int, i
 
 
 def _plan_policy(config: PreTrainedConfig, meta: MixtureMeta, phase: PhaseConfig, plan: PhasePlan) -> None:
-    """Sizes of the policy, which is built without memory for its weights."""
+    """Sizes of the policy, which is built without memory for its weights, and what it does not read."""
+    if cut := cut_instructions(config, meta.tasks):
+        plan.notes.append(cut)
     try:
         policy = builders.policy_without_weights(config, meta)
     except Exception as error:  # where weights or packages are missing

@@ -16,6 +16,7 @@ from lerobot.configs.train import TrainPipelineConfig
 from robocasa_lerobot.data.mixture import MixtureDataset, MixtureMeta, StepBatches
 from robocasa_lerobot.data.statistics import Statistics
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.policies.cut_instructions import cut_instructions
 from robocasa_lerobot.training import records
 from robocasa_lerobot.training.config.experiment import FROM_SCRATCH, HUB, ExperimentConfig, PhaseConfig
 from robocasa_lerobot.training.held_out import HeldOut, held_out_frames, without_held_out
@@ -76,6 +77,8 @@ def prepare_phase(
     where = init or (FROM_SCRATCH if last is None else last)
     accelerator.print(f"phase {phase.name}: {phase.steps} steps from {where} on")
     accelerator.print("  " + dataset.describe().replace("\n", "\n  "))
+    if cut := cut_instructions(config, dataset.meta.tasks):
+        accelerator.print(f"  note: {cut}")
     if starts:
         accelerator.print(f"  statistics of normalisation: {phase.statistics}")
     for part in (dataset, apart) if apart is not None else (dataset,):

@@ -8,13 +8,17 @@ from __future__ import annotations
 
 import fnmatch
 from collections.abc import Sequence
+from types import MethodType
+from typing import Any
 
 import torch
 from torch import Tensor, nn
+from torch.nn import functional
 from torch.nn.utils import parametrize
 
 from robocasa_lerobot.errors import UnknownNameError
 from robocasa_lerobot.training.config.phase import LoraConfig, PhaseConfig
+from robocasa_lerobot.training.weights.master_weights import HALF
 
 _INSIDE = "parametrizations"  # torch's name for where the original weight and its change live
 
@@ -37,8 +41,24 @@ class LowRank(nn.Module):
         self.dropout = nn.Dropout(config.dropout)
 
     def forward(self, weight: Tensor) -> Tensor:
-        """The changed weight (out, in)."""
+        """The changed weight (out, in), rounded once where it is in half precision."""
+        if weight.dtype in HALF:
+            return (weight.float() + self.scale * (self.up.float() @ self.dropout(self.down.float()))).to(weight.dtype)
         return weight + self.scale * (self.up @ self.dropout(self.down))
+
+    def change(self, inputs: Tensor) -> Tensor:
+        """What is added to the layer's outputs (..., out) for inputs (..., in)."""
+        return self.scale * functional.linear(functional.linear(inputs, self.dropout(self.down)), self.up)
+
+
+def _beside_the_layer(layer: Any, inputs: Tensor) -> Tensor:
+    """A linear layer's forward whose change goes by its outputs.
+
+    Added to a weight in half precision, which lies on the grid of such numbers, a change below half of its last bit
+    would be lost, and with it most of what is learned at first.
+    """
+    weight = layer.parametrizations.weight
+    return functional.linear(inputs, weight.original, layer.bias) + weight[0].change(inputs)
 
 
 def apply_training_scope(policy: nn.Module, phase: PhaseConfig, seed: int) -> list[nn.Module]:
@@ -96,6 +116,8 @@ def _add_low_rank(policy: nn.Module, config: LoraConfig, seed: int) -> None:
         module, weight = layers[name]
         change = LowRank(getattr(module, weight), config, generator)
         parametrize.register_parametrization(module, weight, change)
+        if isinstance(module, nn.Linear) and module.weight.dtype in HALF:
+            module.forward = MethodType(_beside_the_layer, module)
     names = {f"{n.replace(f'.{_INSIDE}', '').removesuffix('.original')}": n for n, _ in policy.named_parameters()}
     for name in trained:
         policy.get_parameter(names[name]).requires_grad_(True)
