@@ -381,7 +381,9 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
                 started = time.perf_counter()
                 self._pictures = take_pictures(self._open_renderer(), self.data, self.cameras, **self._kinds)
                 self.rendering_seconds += time.perf_counter() - started
-            pictures = {key: dict(by_camera) for key, by_camera in self._pictures.items()}
+            # Those that are shown again are not the caller's to change.
+            given: Any = dict if self.render_observations else copy.deepcopy
+            pictures = {key: given(by_camera) for key, by_camera in self._pictures.items()}
         return {**pictures, "agent_pos": self.robot.read_state(self.model, self.data)}
 
     def _info(self) -> dict[str, Any]:

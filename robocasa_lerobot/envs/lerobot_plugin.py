@@ -6,6 +6,7 @@ env type, so a policy trained on either runs on both without a rename map.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
@@ -25,6 +26,7 @@ from robocasa_lerobot.errors import UnknownNameError, UserError
 from robocasa_lerobot.gl import ensure_drawing
 
 ENV_TYPE = "robocasa_kitchen"
+_PRETRAINING = re.compile(r"pretrain\d+")  # task sets that are tried in pretraining kitchens
 
 
 class _ReopeningVectorEnv(gymnasium.vector.SyncVectorEnv):
@@ -65,13 +67,15 @@ class RobocasaKitchenEnvConfig(EnvConfig):
     """One or more kitchen tasks, each evaluated in vector envs of its own.
 
     `task` is a task name, a task set, or a comma-separated list of them, `image_size` the height and width in pixels,
-    and `episode_length` the time limit in control steps (20 Hz), by default each task's own horizon. `render_devices`
+    and `episode_length` the time limit in control steps (20 Hz), by default each task's own horizon. `split` is that of
+    the task set where none is given, as with LeRobot's own RoboCasa: `pretrain50` to `pretrain300` are tried in
+    pretraining kitchens, all else in the target kitchens. `render_devices`
     are the EGL devices (not CUDA's numbers, see `gl`) that parallel kitchens are dealt out to; EGL's choice if None.
     """
 
     task: str = "OpenDrawer"
     fps: int = contract.CONTROL_HZ
-    split: str = "target"
+    split: str | None = None
     render_preset: str = "fast"
     image_size: int = contract.IMAGE_SIZE
     episode_length: int | None = None
@@ -109,11 +113,17 @@ class RobocasaKitchenEnvConfig(EnvConfig):
     def gym_kwargs(self) -> dict[str, Any]:
         """Keyword arguments of `KitchenEnv`, less the task."""
         return {
-            "split": self.split,
+            "split": self._split(),
             "render_preset": self.render_preset,
             "image_size": self.image_size,
             "horizon": self.episode_length,
         }
+
+    def _split(self) -> str:
+        if self.split is not None:
+            return self.split
+        asked = [name.strip() for name in self.task.split(",") if name.strip()]
+        return "pretrain" if asked and all(_PRETRAINING.fullmatch(name) for name in asked) else "target"
 
     def task_names(self) -> tuple[str, ...]:
         """The tasks that `task` names, in order, with each set replaced by its members.

@@ -86,7 +86,7 @@ def page(task: Task) -> Iterator[str]:
         yield f"- Kitchens: those with {', '.join(task.needs) or 'anything'}{without}"
     yield "- Goal:"
     yield from goal_lines(goal_of(task))
-    notes = [note for note in (task.facts.note, _INSIDE_NOTE if _asks_inside(goal_of(task)) else None) if note]
+    notes = [note for note in (task.facts.note, _INSIDE_NOTE if asks_inside(goal_of(task)) else None) if note]
     yield from (f"- Other than the original: {note}" for note in notes)
 
 
@@ -123,7 +123,8 @@ def _skill(task: Task) -> str:
     return stages_of(task)[0].skill.replace("_", " ")
 
 
-def _asks_inside(goal: Goal) -> bool:
+def asks_inside(goal: Goal) -> bool:
+    """Whether a goal has something inside a fixture."""
     return any(isinstance(part, ObjectInside) for part in every_goal_in(goal))
 
 

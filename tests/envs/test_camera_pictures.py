@@ -244,6 +244,9 @@ def test_depth_alone_and_no_cameras() -> None:
     env.render_observations = False
     later, *_ = env.step(np.zeros(12, dtype=np.float32))
     np.testing.assert_array_equal(later["depth"][WRIST], observation["depth"][WRIST])  # the last ones are kept
+    later["depth"][WRIST][:] = 0
+    again, *_ = env.step(np.zeros(12, dtype=np.float32))
+    np.testing.assert_array_equal(again["depth"][WRIST], observation["depth"][WRIST])
     env.close()
     env = KitchenEnv("OpenDrawer", image_size=16, cameras=(), segmentation=True)
     observation, _ = env.reset(seed=0)

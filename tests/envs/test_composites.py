@@ -95,6 +95,8 @@ def test_numbers_fixtures_and_stages(name: str, blueprints: dict[str, Any]) -> N
     _check_robot_start(task, row)
     assert len(task.paraphrases) >= 4
     assert row["instruction"] not in (task.instruction, *task.paraphrases)
+    if re.search(r"\{\w*side\}|\{left/right\}", row["instruction"]):
+        assert "side}" in task.instruction, row["instruction"]
 
 
 def _is_of_another(said: str, row: dict[str, Any]) -> bool:

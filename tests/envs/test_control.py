@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import mujoco
 import numpy as np
 import pytest
 from robot_arena import Arena, action, arena_spec
 
 from robocasa_lerobot.contract import ContractError
+from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.robots.control_step import DivergedError
 from robocasa_lerobot.envs.robots.panda_omron import names
 from robocasa_lerobot.envs.robots.panda_omron.control import indices
 from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
@@ -182,6 +186,17 @@ def test_actions_beyond_one_are_clipped(model: mujoco.MjModel) -> None:
         arena.run(action(1.0, position=(size, 0, -size), base=(size, 0, 0), torso=size), 5)
         states.append(arena.state())
     np.testing.assert_array_equal(states[0], states[1])
+
+
+def test_physics_that_is_lost_is_raised_and_leaves_no_log(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    env = KitchenEnv("OpenDrawer", cameras=())
+    env.reset(seed=0)
+    env.data.qvel[:] = 1e12
+    with pytest.raises(DivergedError):
+        env.step(np.zeros(12, dtype=np.float32))
+    env.close()
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("bad", [np.zeros(11), np.zeros((1, 12)), np.full(12, np.nan), np.full(12, np.inf)])

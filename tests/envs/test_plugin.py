@@ -103,6 +103,24 @@ def test_tasks_by_list() -> None:
     assert config.task_names() == ("OpenDrawer", "CloseDrawer")
 
 
+@pytest.mark.parametrize(
+    ("task", "split"),
+    [
+        ("pretrain50", "pretrain"),
+        ("pretrain300", "pretrain"),
+        ("atomic_seen", "target"),
+        ("composite_unseen", "target"),
+        ("OpenDrawer", "target"),
+        ("pretrain50,OpenDrawer", "target"),
+    ],
+)
+def test_task_sets_have_lerobots_splits(task: str, split: str) -> None:
+    from lerobot.envs.robocasa import _TASK_GROUP_SPLITS
+
+    assert RobocasaKitchenEnvConfig(task=task).gym_kwargs["split"] == _TASK_GROUP_SPLITS.get(task, split) == split
+    assert RobocasaKitchenEnvConfig(task=task, split="pretrain_val").gym_kwargs["split"] == "pretrain_val"
+
+
 def test_task_sets_stand_for_their_members() -> None:
     for name in registry.task_sets():
         assert RobocasaKitchenEnvConfig(task=name).task_names() == registry.task_set(name)

@@ -10,8 +10,9 @@ import pytest
 from robocasa_lerobot.envs.kitchens.footprints import Footprint, Footprints, PlacementError
 from robocasa_lerobot.envs.kitchens.layout import layout_ids, load_layout
 from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
+from robocasa_lerobot.envs.scene.drawn import PlacedObject
 from robocasa_lerobot.envs.scene.placement.objects import place_objects
-from robocasa_lerobot.envs.scene.placement.regions import choose_parts, parts_of, rectangle_in
+from robocasa_lerobot.envs.scene.placement.regions import Part, choose_parts, parts_of, rectangle_in
 from robocasa_lerobot.envs.scene.robot_poses import faces, is_free, open_doors_of, robot_pose
 from robocasa_lerobot.envs.scene.roles import candidates, cast_roles, footprint, ground_fixture
 from robocasa_lerobot.envs.scene.spec import FixtureSpec, ObjectSpec, Placement, RobotStart, SampleRegion
@@ -84,6 +85,37 @@ def test_food_stands_in_its_container_and_regions_are_taken_again() -> None:
         assert plate.item.category.name == "plate"
         assert np.hypot(obj.pos[0] - plate.pos[0], obj.pos[1] - plate.pos[1]) < max(plate.item.size[:2]) / 2
         assert obj.pos[2] > plate.pos[2]
+        parts = parts_of(LAYOUT, COUNTER)
+        assert len(parts) > 1
+        assert len({_part_under(thing, parts) for thing in placed.values()}) == 1
+
+
+def _part_under(thing: PlacedObject, parts: list[Part]) -> int:
+    """Which part of the counter is nearest to an object's middle."""
+    x, y = COUNTER.to_local(thing.pos)
+    areas = [part.area for part in parts]
+    return min(
+        range(len(areas)),
+        key=lambda i: max(areas[i].x0 - x, x - areas[i].x1, 0.0) + max(areas[i].y0 - y, y - areas[i].y1, 0.0),
+    )
+
+
+def test_several_alike_stand_on_the_part_of_the_first() -> None:
+    """Anywhere on the counter, and all on one side of the sink."""
+    start = Placement("counter", size=(0.6, 0.4), pos=(None, -1.0), reuse_region_from="cup")
+    task, parts = _task(ObjectSpec("cup", ("cup",), start, count=(3, 3), repeats=True)), parts_of(LAYOUT, COUNTER)
+    used = set()
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        roles = cast_roles(rng, task.fixtures, LAYOUT)
+        try:
+            placed = place_objects(rng, task, "target", LAYOUT, roles, {})
+        except PlacementError:  # a strip that is too narrow for three
+            continue
+        stand_on = {_part_under(thing, parts) for thing in placed.values()}
+        assert len(stand_on) == 1
+        used |= stand_on
+    assert len(used) > 1
 
 
 def test_nothing_starts_in_a_door_that_is_open() -> None:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import functools
 import math
 import zlib
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass, field, replace
 from importlib import resources
 from pathlib import Path
@@ -309,14 +309,15 @@ def _three(factors: float | Iterable[float]) -> list[float]:
 
 
 def pool(
-    groups: Iterable[str],
+    groups: Collection[str],
     *,
     properties: Iterable[str] = (),
     exclude: Iterable[str] = (),
     max_size: tuple[float | None, float | None, float | None] = (None, None, None),
     scale: float | Iterable[float] = 1.0,
+    with_added: bool = False,
 ) -> tuple[Category, ...]:
-    """Categories of any of the groups that have all properties, by name.
+    """Categories of any of the groups that have all properties, by name; `added` ones only by their own names.
 
     Args:
         groups: names of groups; their categories are united.
@@ -324,6 +325,7 @@ def pool(
         exclude: names of groups or categories that are not wanted.
         max_size: bounds of the full extents of every instance along x, y, z, metres; None leaves an axis free.
         scale: factor, or three, that the object will be scaled by.
+        with_added: also those that we added.
 
     Raises:
         UnknownNameError: no such group or property.
@@ -335,6 +337,7 @@ def pool(
     factors = _three(scale)
     unwanted = {c.name for group in exclude for c in categories_of(group)}
     found = {c.name: c for group in groups for c in categories_of(group) if c.name not in unwanted}
+    found = {name: c for name, c in found.items() if name in groups or with_added or not c.added}
     wanted = set(properties)
 
     def fits(category: Category) -> bool:
@@ -375,13 +378,18 @@ def sample(
     """
     wanted = tuple(properties)
     factors = object_scale if isinstance(object_scale, int | float) else tuple(object_scale)
-    categories = pool(groups, properties=wanted, exclude=exclude, max_size=max_size, scale=factors)
+    asked: dict[str, Any] = {"properties": wanted, "exclude": exclude, "max_size": max_size, "scale": factors}
+    categories = pool(groups, **asked)
     if not categories:
         raise UserError(
             f"no object category of groups {tuple(groups)} has the properties {sorted(wanted)} within {max_size} m, "
             f"without {sorted(exclude)}; widen the groups or the bounds."
         )
-    category = categories[int(rng.integers(len(categories)))]
+    # One of ours is drawn again, so that most scenes of a seed are as they were when those were drawn, too.
+    drawn = pool(groups, **asked, with_added=True)
+    category = drawn[int(rng.integers(len(drawn)))]
+    if category not in categories:
+        category = categories[int(rng.integers(len(categories)))]
     item = scaled(instance(category, int(rng.choice(split_indices(split)))), factors)
     return replace(item, upright=True) if rotate_upright else item
 

@@ -39,9 +39,16 @@ def inlined[**P, T](function: Callable[P, T]) -> Callable[P, T]:
     return njit(nogil=True, inline="always")(function)
 
 
+def _say_nothing(text: str) -> None:
+    """In place of MuJoCo's own handler, which appends to a file that parallel processes share."""
+
+
 @cache
 def load() -> Path:
     """Load the library that the `mujoco` package itself uses, so that its functions resolve, and return its path.
+
+    From then on MuJoCo's warnings write no MUJOCO_LOG.TXT into the working folder, unless the process has its own
+    handler: what they are about, unstable physics, is raised where it happens.
 
     Raises:
         ImportError: the package has no shared library where its wheels carry it.
@@ -52,6 +59,8 @@ def load() -> Path:
     for name in names:
         if (folder / name).is_file():
             binding.load_library_permanently(str(folder / name))
+            if mujoco.get_mju_user_warning() is None:
+                mujoco.set_mju_user_warning(_say_nothing)
             return folder / name
     raise ImportError(
         f"no MuJoCo library in {folder}: looked for {', '.join(names)}. "

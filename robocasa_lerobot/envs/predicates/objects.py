@@ -244,7 +244,7 @@ class ObjectAtSite(Term):
 
 @dataclass(frozen=True)
 class ObjectUpright(Term):
-    """An object's own z axis is within 15 degrees of the vertical."""
+    """An object's roll and pitch are below 15 degrees."""
 
     object: str
 
@@ -254,8 +254,10 @@ class ObjectUpright(Term):
         return f"{plain(self.object)}_upright"
 
     def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
-        """Compare the tilt with the bound."""
-        return bool(data.body(scene.fill(self.object)).xmat.reshape(3, 3)[2, 2] > np.cos(UPRIGHT_RAD))
+        """Compare both with the bound."""
+        down = data.body(scene.fill(self.object)).xmat.reshape(3, 3)[2]
+        roll, pitch = np.arctan2(down[1], down[2]), np.arctan2(-down[0], np.hypot(down[1], down[2]))
+        return bool(max(abs(roll), abs(pitch)) < UPRIGHT_RAD)
 
 
 @dataclass(frozen=True)

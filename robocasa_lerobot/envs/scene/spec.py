@@ -115,8 +115,8 @@ class SampleRegion:
 
     Attributes:
         ref: role of a reference fixture; none uses the whole fixture. This and `loc` may name a choice in braces.
-        loc: "nn" takes the part nearest to the reference, "left" or "right" those on one side of it, "left_right" those
-            on either, "any" all.
+        loc: with a reference, "nn" takes the part nearest to it, "left" or "right" those on one side, "left_right"
+            those on either, "any" all.
         top_size: least width and depth of the part, metres.
         height: bounds of the height in the room of the part's floor, metres.
         level: number of the part from below; -1 is the highest. May name a choice in braces.
@@ -125,7 +125,7 @@ class SampleRegion:
     """
 
     ref: str = ""
-    loc: str = "any"
+    loc: str = "nn"
     top_size: tuple[float, float] = (0.0, 0.0)
     height: tuple[float, float] = (0.0, 3.0)
     level: int | str | None = None
@@ -149,7 +149,8 @@ class Placement:
         rotation: bounds of the turn, radians.
         other_rotation: other bounds, which are as likely, where there are some.
         try_to_place_in: object group: what can be in a container stands in one of that group, `<name>_container`.
-        reuse_region_from: name of an object whose part of the fixture is taken again.
+        reuse_region_from: name of an object on whose part of the fixture it starts. Of several alike their own: all
+            start on that of the first.
         ensure_inside: the whole footprint lies in the rectangle, not its middle alone.
         slot: it stands along the longer side of the part, and out of its top, as bread does in a toaster.
         lying: on a fixture, it lies on its side: turned by a quarter about its own x axis.

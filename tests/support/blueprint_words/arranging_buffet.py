@@ -37,6 +37,7 @@ OURS = {
             "fridge doors closed": None,
             "one empty tray on dining_counter; other trays hold distractor food": "tray",
         },
+        turned={"tray": (0.0, 0.0)},
     ),
     "CutBuffetPizza": Ours(
         goal={
@@ -50,6 +51,7 @@ OURS = {
             "robot base beside the drawer (left or right at random among free sides, offset half drawer "
             "width + 0.20 m); {drawer_side} = side of the drawer seen from robot": None,
         },
+        near={"drawer": "dining_counter"},
     ),
     "TongBuffetSetup": Ours(
         goal={
@@ -64,6 +66,7 @@ OURS = {
             "robot base beside the drawer (left or right at random among free sides, offset half drawer "
             "width + 0.20 m); {drawer_side} = side of the drawer seen from robot": None,
         },
+        turned={"food_container": (0.0, 0.0)},
     ),
     "PlaceBeveragesTogether": Ours(
         goal={
@@ -100,5 +103,6 @@ OURS = {
             "meats on one of the two highest fridge shelves and vegetables on the other, which one at random": "meat1",
             "each tray holds one pair of tongs": None,
         },
+        turned=dict.fromkeys(("tray1_container", "tray2_container"), (0.0, 0.0)),
     ),
 }

@@ -34,7 +34,7 @@ OURS = {
             f"every obj_i on receptacle {NEAR.format('receptacle')}": ForEach(
                 "obj", lambda name: ObjectOn(name, "receptacle")
             ),
-            "gripper > 0.25 m from obj_0": ForEach("obj", GripperFar),
+            "gripper > 0.25 m from obj_0": GripperFar("obj_0"),
         },
         initial={"number of breads random 1-3": "obj"},
         called={"obj_0": "obj_i"},

@@ -17,6 +17,7 @@ from robocasa_lerobot.envs.predicates import (
 )
 from robocasa_lerobot.envs.scene.initial_states import Water
 from robocasa_lerobot.envs.tasks.atomic.common import HANDLE_TO_FRONT
+from robocasa_lerobot.envs.tasks.composite.common import both_together
 
 DRY = {"faucet off": Water("sink", on=False)}
 DRY_AT_FIRST = {"faucet off (not set by the task, default)": None}
@@ -34,6 +35,8 @@ def rinsed(name: str, *, on_end: bool) -> StepsWhile:
 SCRUBBED = StepsWhile(
     AllOf(ObjectOn("sponge", "bowl"), MovedSince("sponge", since="step", by_m=0.001)), 15, label="bowl_scrubbed"
 )
+
+LEFT = both_together("leftover1", "leftover2", "bowl")
 
 OURS = {
     "ClearSink": Ours(
@@ -57,8 +60,8 @@ OURS = {
     ),
     "DumpLeftovers": Ours(
         goal={
-            "leftover1 NOT in bowl (contact and xy dist < 0.7 x radius)": Not(ObjectOn("leftover1", "bowl")),
-            "leftover2 NOT in bowl (intended; source tests leftover1 twice)": Not(ObjectOn("leftover2", "bowl")),
+            "leftover1 NOT in bowl (contact and xy dist < 0.7 x radius)": Not(LEFT[0]),
+            "leftover2 NOT in bowl (intended; source tests leftover1 twice)": Not(LEFT[1]),
             **inside("bowl"),
             **away("bowl"),
         },

@@ -62,5 +62,6 @@ OURS = {
         initial={
             "fridge door(s) open (0.90-1.0)": InitialOpenness("fridge", 0.9, 1.0, part="fridge"),
         },
+        turned={"serving_tray": (0.0, 0.0)},
     ),
 }

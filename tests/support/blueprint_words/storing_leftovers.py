@@ -8,7 +8,6 @@ from robocasa_lerobot.envs.predicates import (
     Exactly,
     GripperFar,
     Near,
-    ObjectInside,
     ObjectOn,
     ObjectTouches,
     OnShelf,
@@ -29,7 +28,7 @@ OURS = {
             "chicken_drumstick in bowl (contact; centre xy < 0.7*bowl radius)": ObjectOn("chicken_drumstick", "bowl"),
             "vegetable in bowl (contact; centre xy < 0.7*bowl radius)": ObjectOn("vegetable", "bowl"),
             "bowl inside fridge shelf region, any shelf (origin z between shelf floor and 90% of shelf height; bbox "
-            "corners inside, tol 0.05)": ObjectInside("bowl", "fridge", region="fridge_shelf", margin=0.05, lower=0.9),
+            "corners inside, tol 0.05)": OnShelf("bowl", "fridge"),
             "gripper > 0.25 m from bowl": GripperFar("bowl", 0.25),
         },
         initial={"fridge doors open": OPEN, "robot base centred on bowl": "bowl"},

@@ -35,7 +35,7 @@ class _Table:
     Attributes:
         placed: objects by name.
         taken: their footprints.
-        parts: which part of a fixture each object stands on.
+        parts: which part of a fixture each object stands on; before it does, those that it may.
         holders: names of the containers that were put under objects.
     """
 
@@ -114,7 +114,8 @@ def _put(
             container = catalogue.sample(rng, (start.try_to_place_in,), split)
             holder = f"{name}_container"
             table.holders.add(holder)
-            _put_down(rng, table, holder, container, areas, standing, below=below)
+            chosen = _put_down(rng, table, holder, container, areas, standing, below=below)
+            table.parts[name] = [table.parts[name][chosen]]
             # What may stick out is the container: an object across its rim would tip over.
             _put_on(rng, table, name, item, table.placed[holder], replace(start, ensure_inside=True))
             return
@@ -123,7 +124,9 @@ def _put(
         if must or (inside and fixture.door_names and start.ensure_inside and not start.slot):
             rooms = [part.area for part in table.parts[name]]
     lying = isinstance(start, Placement) and start.lying
-    _put_down(rng, table, name, item, areas, standing, rooms, must=must, lying=lying, below=below)
+    chosen = _put_down(rng, table, name, item, areas, standing, rooms, must=must, lying=lying, below=below)
+    if name in table.parts:
+        table.parts[name] = [table.parts[name][chosen]]
 
 
 def _in_the_air(doors: Sequence[OpenDoor], z: float, item: catalogue.Instance) -> list[Footprint]:
@@ -158,8 +161,10 @@ def _areas(
 ) -> list[Area]:
     region = start.region
     ref = layout.fixtures[roles[region.ref]] if region.ref else None
-    if start.reuse_region_from:
-        parts = table.parts[numbered(start.reuse_region_from, table.parts)[0]]
+    again = numbered(start.reuse_region_from, table.parts) if start.reuse_region_from else []
+    assert again or name.startswith(f"{start.reuse_region_from}_") or not start.reuse_region_from, start
+    if again:
+        parts = table.parts[again[0]]
     else:
         parts = choose_parts(layout, start, fixture, ref, openness.get(fixture.name, 0.0))
     table.parts[name] = parts
@@ -178,8 +183,10 @@ def _put_down(
     must: bool = False,
     lying: bool = False,
     below: Fixture | None = None,
-) -> None:
-    """Put an object onto one of the areas; if `rooms` are given, so that it is wholly in one, which it `must` or can.
+) -> int:
+    """Put an object onto one of the areas, whose number is given.
+
+    If `rooms` are given, it is put so that it is wholly in one, which it `must` or can.
 
     It must in basins and drawers. In a compartment behind a door it is pushed in where it would stick out. It stands
     without tipping on the fixture `below`, if it can.
@@ -221,6 +228,7 @@ def _put_down(
     table.taken.append((footprint, area.z))
     z = area.z + height / 2 + PLACEMENT_GAP_M
     table.placed[name] = PlacedObject(name, item, (footprint.x, footprint.y, z), footprint.yaw, lying)
+    return next(number for number, one in enumerate(areas) if one is area)
 
 
 def _weight_of(footprint: Footprint, middle: tuple[float, float]) -> tuple[float, float]:

@@ -61,7 +61,9 @@ def _door(
 _OVEN_DISH = ObjectSpec(
     "door_obj",
     ("oven_ready",),
-    Placement("fxtr", size=(1.0, 0.45), pos=(None, -1.0), try_to_place_in="oven_tray"),
+    Placement(
+        "fxtr", region=SampleRegion(name="rack"), size=(1.0, 0.45), pos=(None, -1.0), try_to_place_in="oven_tray"
+    ),
     graspable=True,
 )
 

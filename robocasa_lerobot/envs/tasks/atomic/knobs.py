@@ -30,7 +30,7 @@ _KETTLE = ObjectSpec(
 _COOKWARE = ObjectSpec(
     "cookware",
     ("pan", "pot", "saucepan", "kettle_non_electric"),
-    on_burner(SampleRegion(name="{knob}|any")),
+    on_burner(SampleRegion(name="{knob}|any", height=(0.7, 1.2))),
 )
 
 

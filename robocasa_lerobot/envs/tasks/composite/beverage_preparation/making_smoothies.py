@@ -208,12 +208,12 @@ PLACE_STRAW = Task(
         Stage("pick_place", "pick", "drawer", object="straw"),
         Stage("pick_place", "place", "cup", object="straw", until=_IN_CUP),
     ),
-    instruction="Take the straw out of the open drawer and put it into the cup of smoothie.",
+    instruction="Take the straw out of the open drawer to the {side} and put it into the cup of smoothie.",
     paraphrases=(
-        "The smoothie lacks its straw, which is in the drawer.",
-        "Put the drawer's straw into the cup on the counter.",
-        "A straw belongs in the cup: there is one in the open drawer.",
-        "Pick the straw up in the drawer and let it slip into the smoothie.",
+        "The smoothie lacks its straw, which is in the drawer to your {side}.",
+        "Put the straw of the {side} drawer into the cup on the counter.",
+        "A straw belongs in the cup: there is one in the open drawer on the {side}.",
+        "Pick the straw up in the {side} drawer and let it slip into the smoothie.",
     ),
 )
 

@@ -19,7 +19,7 @@ from robocasa_lerobot.envs.predicates import (
 from robocasa_lerobot.envs.scene.initial_states import Water
 from robocasa_lerobot.envs.scene.spec import Choice, FixtureSpec, ObjectSpec, Placement, RobotStart, SampleRegion
 from robocasa_lerobot.envs.tasks.atomic.common import HANDLE_TO_FRONT, counter_near, on_counter
-from robocasa_lerobot.envs.tasks.composite.common import fetch
+from robocasa_lerobot.envs.tasks.composite.common import fetch, together
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
 _SINK = (FixtureSpec("sink", "sink"), counter_near("sink"))
@@ -238,7 +238,10 @@ SCRUB_BOWL = Task(
     ),
 )
 
-_ANY_BURNER = Placement("stove", region=SampleRegion(name="any"), size=(0.2, 0.2), ensure_inside=False)
+# Not in the oven below, which is a region of a range as well.
+_ANY_BURNER = Placement(
+    "stove", region=SampleRegion(name="any", height=(0.7, 1.2)), size=(0.2, 0.2), ensure_inside=False
+)
 _WASHED_UP = ("pot", "pan")
 
 TRANSPORT_COOKWARE = Task(
@@ -270,7 +273,8 @@ TRANSPORT_COOKWARE = Task(
     ),
 )
 
-_TIPPED_OUT = AllOf(Not(ObjectOn("leftover1", "bowl")), Not(ObjectOn("leftover2", "bowl")))
+# What lies on the other one in the bowl is in it, too.
+_TIPPED_OUT = AllOf(Not(together("leftover1", "leftover2", "bowl")), Not(together("leftover2", "leftover1", "bowl")))
 
 
 def _leftover(name: str) -> ObjectSpec:

@@ -69,7 +69,7 @@ def _bread_on_board(name: str) -> ObjectOn:
 
 BREAD_SETUP_SLICING = Task(
     name="BreadSetupSlicing",
-    summary="Every piece of bread lies on the cutting board, the gripper away from each.",
+    summary="Every piece of bread lies on the cutting board, the gripper away from the first.",
     fixtures=(FixtureSpec("counter", "counter", size=(0.9, 0.4)),),
     robot_start=RobotStart("counter", at_object="receptacle"),
     objects=(
@@ -84,7 +84,7 @@ BREAD_SETUP_SLICING = Task(
             repeats=True,
         ),
     ),
-    goal=AllOf(ForEach("obj", _bread_on_board), ForEach("obj", GripperFar)),
+    goal=AllOf(ForEach("obj", _bread_on_board), GripperFar("obj_0")),
     stages=(EachStage("obj", lambda name: (_onto(name, "receptacle"),)),),
     instruction="Put {obj} on the cutting board.",
     paraphrases=(

@@ -92,12 +92,12 @@ GATHER_CUTTING_TOOLS = Task(
             for name in _BOTH
         ),
     ),
-    instruction="Open the drawer and put the peeler and the knife from it on the cutting board.",
+    instruction="Open the drawer to the {side} and put the peeler and the knife from it on the cutting board.",
     paraphrases=(
-        "Peeler and knife are in the closed drawer; lay both on the cutting board.",
-        "Gather what cuts: the drawer's knife and peeler belong on the board.",
-        "Pull the drawer out, and move the peeler, then the knife, to the cutting board on the counter.",
-        "The cutting board should have the peeler and the knife that the drawer holds.",
+        "Peeler and knife are in the closed drawer to your {side}; lay both on the cutting board.",
+        "Gather what cuts: knife and peeler of the {side} drawer belong on the board.",
+        "Pull the {side} drawer out, and move the peeler, then the knife, to the cutting board on the counter.",
+        "The cutting board should have the peeler and the knife that the drawer to the {side} holds.",
     ),
 )
 

@@ -72,7 +72,9 @@ MOVE_TO_COUNTER = Task(
     robot_start=RobotStart("fridge"),
     objects=(
         ObjectSpec("frosted_food", _FROSTED, _FRONT_OF_SHELF, graspable=True),
-        ObjectSpec("distractor_obj", ("any",), _FRONT_OF_SHELF, graspable=True, exclude=_FROSTED),
+        ObjectSpec(
+            "distractor_obj", ("any",), _FRONT_OF_SHELF, graspable=True, exclude=_FROSTED, properties=("fridgable",)
+        ),
         ObjectSpec("plate", ("plate",), on_counter("fridge", (0.4, 0.4))),
     ),
     initial=(InitialOpenness("fridge", 0.9, 1.0, part="fridge"),),

@@ -131,6 +131,7 @@ MAKE_BANANA_MILKSHAKE = Task(
             ("any",),
             Placement("fridge", region=SampleRegion(name="fridge_shelf:any"), size=(0.5, 0.3), pos=(0.0, 0.0)),
             exclude=("milk", "honey_bottle", "banana"),
+            properties=("fridgable",),
         ),
         ObjectSpec("honey", ("honey_bottle",), in_cabinet("cabinet", (0.3, 0.2)), graspable=True),
     ),

@@ -307,6 +307,7 @@ PREPARE_VEGGIE_DIP = Task(
             ("any",),
             Placement("fridge", region=SampleRegion(name="fridge_shelf:any"), size=(0.5, 0.3), pos=(0.0, 0.0)),
             exclude=("vegetable", "cream_cheese_stick"),
+            properties=("fridgable",),
         ),
     ),
     initial=(InitialOpenness("fridge", 0.9, 1.0, part="fridge"), LidAside("blender")),

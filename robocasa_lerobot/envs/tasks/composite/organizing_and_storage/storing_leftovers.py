@@ -8,7 +8,6 @@ from robocasa_lerobot.envs.predicates import (
     Exactly,
     GripperFar,
     Near,
-    ObjectInside,
     ObjectOn,
     ObjectTouches,
     OnShelf,
@@ -68,7 +67,7 @@ STORE_LEFTOVERS_IN_BOWL = Task(
     goal=AllOf(
         ObjectOn("chicken_drumstick", "bowl"),
         ObjectOn("vegetable", "bowl"),
-        ObjectInside("bowl", "fridge", region="fridge_shelf", lower=0.9),
+        OnShelf("bowl", "fridge"),
         GripperFar("bowl"),
     ),
     stages=(
@@ -76,7 +75,7 @@ STORE_LEFTOVERS_IN_BOWL = Task(
         Stage("pick_place", "place", "bowl", object="vegetable"),
         Stage("pick_place", "pick", "dining_counter", object="bowl"),
         Stage("navigation", "drive", "fridge", object="bowl"),
-        Stage("pick_place", "place", "fridge", object="bowl", part="fridge_shelf"),
+        Stage("pick_place", "place", "fridge", object="bowl", part="fridge_shelf:any"),
     ),
     instruction="Put the drumstick and the {vegetable} from the plates into the bowl, and the bowl into the fridge.",
     paraphrases=(

@@ -80,12 +80,12 @@ DRAWER_UTENSIL_SORT = Task(
     ),
     goal=AllOf(*(part for name in _UTENSILS for part in _put_away(name).parts)),
     stages=(Stage("drawers", "open", "drawer"), *map(_into_drawer, _UTENSILS)),
-    instruction="Open the drawer and put {utensil1+utensil2} from the counter into it.",
+    instruction="Open the drawer to the {side} and put {utensil1+utensil2} from the counter into it.",
     paraphrases=(
-        "Tidy the counter: {utensil1+utensil2} belong in the closed drawer below.",
-        "Pull the drawer out and lay both utensils in it.",
-        "The two utensils on the counter go into the drawer, which has to be opened.",
-        "Put the {utensil1} and the {utensil2} away in the drawer.",
+        "Tidy the counter: {utensil1+utensil2} belong in the closed drawer to your {side}.",
+        "Pull the {side} drawer out and lay both utensils in it.",
+        "The two utensils on the counter go into the drawer to the {side}, which has to be opened.",
+        "Put the {utensil1} and the {utensil2} away in the {side} drawer.",
     ),
 )
 

@@ -11,6 +11,7 @@ from robocasa_lerobot.envs.tasks.task import Stage, Task
 
 _AWAY_M = 0.15
 _ACROSS = (np.pi / 2, np.pi / 2)  # radians
+_ALONG = (0.0, 0.0)  # of our trays, which are longer along another axis than the original's
 _ANYWHERE = Placement("dining_counter")
 
 
@@ -49,7 +50,7 @@ ARRANGE_BUFFET_DESSERT = Task(
     objects=(
         _sweet("sweet1", "highest", -0.3),
         _sweet("sweet2", "second_highest", 0.3),
-        ObjectSpec("tray", ("tray",), before_stool((0.4, 0.4), pos=(0.0, -1.0), rotation=_ACROSS)),
+        ObjectSpec("tray", ("tray",), before_stool((0.4, 0.4), pos=(0.0, -1.0), rotation=_ALONG)),
         *_full_tray("distractor_cooked_food", "cooked_food", "pizza", _ACROSS),
         *_full_tray("distractor_bread_food", "bread_food", "sweets", Placement().rotation),
         ObjectSpec("distractor_glass_cup", ("glass_cup",), _ANYWHERE, graspable=True),
@@ -95,7 +96,10 @@ _IN_DRAWER = Placement("drawer", size=(0.3, 0.5), pos=(0.0, 0.0))
 CUT_BUFFET_PIZZA = Task(
     name="CutBuffetPizza",
     summary="The pizza cutter lies on the dining counter, as the pizza does, the gripper 15 cm away from both.",
-    fixtures=(FixtureSpec("drawer", "drawer_top"), FixtureSpec("dining_counter", "dining_counter")),
+    fixtures=(
+        FixtureSpec("dining_counter", "dining_counter"),
+        FixtureSpec("drawer", "drawer_top", near="dining_counter"),
+    ),
     robot_start=RobotStart("drawer", beside=True),
     objects=(
         ObjectSpec("pizza_cutter", ("pizza_cutter",), _IN_DRAWER, graspable=True, scale=(1.0, 1.0, 1.5)),
@@ -123,12 +127,12 @@ CUT_BUFFET_PIZZA = Task(
             until=AllOf(ObjectTouches("pizza_cutter", "dining_counter"), GripperFar("pizza_cutter", _AWAY_M)),
         ),
     ),
-    instruction="Open the drawer, take the pizza cutter out of it and lay it on the dining counter with the pizza.",
+    instruction="Open the drawer to your {side}, take out the pizza cutter and lay it on the dining counter's top.",
     paraphrases=(
-        "The pizza on the dining counter has to be cut: bring the cutter out of the drawer to it.",
-        "Fetch the pizza cutter from the closed drawer beside you and put it on the dining counter.",
-        "Pull the drawer open and carry the pizza cutter to the dining counter.",
-        "The dining counter should have the pizza cutter that lies in the drawer.",
+        "The pizza on the dining counter has to be cut: bring the cutter out of the drawer on the {side} to it.",
+        "Fetch the pizza cutter from the closed drawer to the {side} and put it on the dining counter.",
+        "Pull the {side} drawer open and carry the pizza cutter to the dining counter.",
+        "The dining counter should have the pizza cutter that lies in the drawer to your {side}.",
     ),
 )
 
@@ -147,7 +151,7 @@ TONG_BUFFET_SETUP = Task(
     robot_start=RobotStart("drawer", beside=True),
     objects=(
         ObjectSpec("tongs", ("tongs",), _IN_DRAWER, graspable=True, scale=(1.0, 1.0, 2.5)),
-        ObjectSpec("food_container", ("tray",), before_stool((0.5, 0.4), pos=(0.0, -1.0), rotation=_ACROSS)),
+        ObjectSpec("food_container", ("tray",), before_stool((0.5, 0.4), pos=(0.0, -1.0), rotation=_ALONG)),
         ObjectSpec("food", ("cooked_food",), Placement(object="food_container", rotation=_ACROSS), graspable=True),
         ObjectSpec("distractor_spoon", ("spoon",), before_stool(None, pos=(None, None), rotation=_ROUND)),
         ObjectSpec(
@@ -167,10 +171,10 @@ TONG_BUFFET_SETUP = Task(
         Stage("drawers", "open", "drawer"),
         *fetch("tongs", "drawer", "dining_counter", until=_BESIDE_TRAY),
     ),
-    instruction="Open the drawer and bring the tongs from it to the dining counter, beside the tray with the {food}.",
+    instruction="Open the drawer to the {side} and lay its tongs on the dining counter, by the tray with the {food}.",
     paraphrases=(
-        "Guests need tongs for the {food}: there are some in the closed drawer; put them by the tray.",
-        "Take the tongs out of the drawer beside you and lay them near the tray on the dining counter.",
+        "Guests need tongs for the {food}: there are some in the closed drawer to the {side}; put them by the tray.",
+        "Take the tongs out of the drawer to your {side} and lay them near the tray on the dining counter.",
         "The tray with the {food} should have tongs next to it.",
         "Set the buffet up with the drawer's tongs, close to the tray of food.",
     ),
@@ -298,7 +302,7 @@ DIVIDE_BUFFET_TRAYS = Task(
             ObjectSpec(
                 tray,
                 ("tray",),
-                before_stool((0.6, 0.4), stool=f"stool{number}", rotation=_ACROSS),
+                before_stool((0.6, 0.4), stool=f"stool{number}", rotation=_ALONG),
                 repeats=True,
             )
             for number, tray in enumerate(_TRAYS, start=1)

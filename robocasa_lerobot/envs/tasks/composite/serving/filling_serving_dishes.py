@@ -1,7 +1,5 @@
 """Fill dishes at the dining counter."""
 
-import numpy as np
-
 from robocasa_lerobot.envs.predicates import AllOf, AnyOf, GripperFar, ObjectOn, ObjectTouches
 from robocasa_lerobot.envs.scene.spec import (
     FixtureSpec,
@@ -196,7 +194,7 @@ DISPLAY_MEAT_VARIETY = Task(
         ObjectSpec(
             "serving_tray",
             ("tray",),
-            before_stool((0.6, 0.4), counter="dining_table", rotation=(np.pi / 2, np.pi / 2)),
+            before_stool((0.6, 0.4), counter="dining_table", rotation=(0.0, 0.0)),
         ),
     ),
     initial=(InitialOpenness("fridge", 0.9, 1.0, part="fridge"),),

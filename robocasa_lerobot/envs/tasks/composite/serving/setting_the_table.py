@@ -109,7 +109,13 @@ SIZE_SORTING = Task(
         ObjectSpec(
             "obj",
             ("{kind}",),
-            Placement("counter", region=SampleRegion(top_size=(0.9, 0.4)), size=(0.6, 0.4), pos=(None, -1.0)),
+            Placement(
+                "counter",
+                region=SampleRegion(top_size=(0.9, 0.4)),
+                size=(0.6, 0.4),
+                pos=(None, -1.0),
+                reuse_region_from="obj",
+            ),
             count=(2, 3),
             scale_step=0.8,
             same_category_as="obj",
