@@ -142,9 +142,10 @@ def page(body: dict[str, Any]) -> str:
     lines = [
         "# Does the demo learn?",
         "",
-        f"Written by `make bench-demo`, {body['versions']['commit']}. Each seed has its own demonstrations, training "
-        f"and trials (at most {body['settings']['horizon']} control steps); intervals are Wilson's, 95 %, and do not "
-        "cover what another training would change: the seeds beside each other show that.",
+        f"Written by `make bench-demo`, {body['versions']['commit']}. Each seed has its own demonstrations, recorded "
+        "in the ten target kitchens, in which the policies are tried as well; its own training; and its own trials (at "
+        f"most {body['settings']['horizon']} control steps); intervals are Wilson's, 95 %, and do not cover what "
+        "another training would change: the seeds beside each other show that.",
         "",
         "| policy | task | solved | rate | 95 % interval | seeds |",
         "|---|---|--:|--:|--:|---|",

@@ -7,6 +7,7 @@ from pathlib import Path
 from robocasa_lerobot.errors import UserError, suggest
 
 _FOLDER = "configs"
+_OF_NO_FOLDER = "experiments"  # files beside the folders are of this kind
 _PARTS = "parts"  # folders of files that others are made of
 
 
@@ -33,11 +34,15 @@ def find_config(given: str | Path, kind: str) -> Path:
         UserError: neither is there; the closest name is told.
     """
     folder, path = configs_folder(), Path(given)
-    places = (path, folder / kind / f"{given}.yaml", folder / kind / path, folder.parent / path)
+    places = [path, folder / kind / f"{given}.yaml", folder / kind / path, folder.parent / path]
+    if kind == _OF_NO_FOLDER:
+        places += [folder / f"{given}.yaml"]  # `debug`
     found = next((place for place in places if place.is_file()), None)
     if found is not None:
         return found
     name = path.with_suffix("").as_posix().removeprefix(f"{_FOLDER}/{kind}/")
-    beside = [other.name for other in path.parent.glob("*.yaml")] if path.parent.is_dir() and path.suffix else []
-    closest = suggest(path.name, beside) if beside else suggest(name, config_names(kind))
+    beside = path.parent.glob("[!.]*.yaml") if path.parent.is_dir() and path.suffix else ()
+    closest = suggest(path.name, [other.name for other in beside])
+    if not closest.startswith("Did you mean"):
+        closest = suggest(name, config_names(kind))
     raise UserError(f"no file {given}, and none of that name in {_FOLDER}/{kind}/. {closest}")

@@ -8,7 +8,7 @@ import importlib
 import os
 import select
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
@@ -110,10 +110,33 @@ def build_parser(names: Sequence[str] = tuple(SUBCOMMANDS)) -> argparse.Argument
             description=subcommand.summary[0].upper() + subcommand.summary[1:] + ".",
             epilog=f"example:\n  {module.EXAMPLE}",
             formatter_class=argparse.RawDescriptionHelpFormatter,
+            allow_abbrev=False,  # a part of an option's name is a guess, and the next version may have two of these
         )
         module.configure(child)
         child.set_defaults(run=module.run)
     return parser
+
+
+def _subparser(parser: argparse.ArgumentParser, name: str) -> argparse.ArgumentParser:
+    (subparsers,) = (action for action in parser._actions if isinstance(action, argparse._SubParsersAction))
+    found: argparse.ArgumentParser = subparsers.choices[name]
+    return found
+
+
+def _spelt(argument: str, options: Sequence[str]) -> str:
+    """An argument as it was given, or with `-` for `_` or the other way round where an option is spelt so."""
+    name, equals, value = argument.partition("=")
+    if not name.startswith("--") or name in options:
+        return argument
+    alike = [option for option in options if option[2:].replace("_", "-") == name[2:].replace("_", "-")]
+    return f"{alike[0]}{equals}{value}" if alike else argument
+
+
+def _unknown(arguments: Sequence[str], options: Sequence[str]) -> Iterator[str]:
+    for argument in arguments:
+        name = argument.partition("=")[0]
+        if name.startswith("--") and name not in (*options, "--version", "--"):
+            yield name
 
 
 def main(argv: Sequence[str] | None = None, own_process: bool | None = None) -> int:
@@ -133,9 +156,16 @@ def main(argv: Sequence[str] | None = None, own_process: bool | None = None) -> 
         parser.parse_args(arguments)
         parser.print_help()
         return 0
+    child = _subparser(parser, name)
+    options = [option for option in child._option_string_actions if option.startswith("--")]
+    arguments = [_spelt(argument, options) for argument in arguments]
+    takes_settings = child.get_default("takes_settings")
+    for wrong in () if takes_settings else _unknown(arguments, options):  # before argparse misses what was meant by it
+        print(f"robocasa-lerobot {name}: unknown option {wrong!r}. {suggest(wrong, options)}", file=sys.stderr)
+        return 2
     args, unknown = parser.parse_known_args(arguments)
-    if unknown and not getattr(args, "takes_settings", False):
-        parser.error(f"unrecognized arguments: {' '.join(unknown)}")
+    if unknown and not takes_settings:
+        child.error(f"unrecognized arguments: {' '.join(unknown)}")
     if _is_other_checkout(Path.cwd()):
         print(
             f"robocasa-lerobot {name}: this folder is another checkout than the one that runs; PYTHONPATH={Path.cwd()} "

@@ -23,7 +23,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         nargs="+",
         type=Path,
         metavar="FILE",
-        help="HDF5 files of RoboCasa, robosuite or this project, or folders of LeRobot v2.0 or v2.1 datasets",
+        help="HDF5 files of RoboCasa, robosuite or this project, folders of them, or LeRobot v2.0 or v2.1 datasets",
     )
     parser.add_argument("--out", required=True, type=Path, help="folder of the dataset; must not exist yet")
     parser.add_argument(
@@ -62,11 +62,11 @@ def configure(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Convert, and say what was written, rejected and assumed."""
     execution = execution_of(args)
-    from robocasa_lerobot.convert.reading.inputs import check_demo_files
+    from robocasa_lerobot.convert.reading.inputs import demo_files
     from robocasa_lerobot.convert.settings import CORES_PER_WORKER, ConversionSettings
     from robocasa_lerobot.convert.worker_imports import worker_imports
 
-    check_demo_files(args.files)
+    args.files = demo_files(args.files)
     if execution.kind == "local" and not args.merge and (args.workers or cores_here() // CORES_PER_WORKER) > 1:
         start_importing(worker_imports("robocasa_lerobot.convert.shard", lean=args.own_process))
     settings = ConversionSettings(

@@ -65,7 +65,12 @@ def run(args: argparse.Namespace) -> int:
     config = load_config(EvaluationConfig, [*path, *given, *args.settings])
     if args.check:
         from robocasa_lerobot.evaluation.planning.check import lines, planned
+        from robocasa_lerobot.evaluation.planning.trials import Shard
 
+        if config.shard is not None:
+            Shard.parse(config.shard)
+        if config.out is not None and Path(config.out).is_file():
+            raise UserError(f"--out {config.out} is a file, expected a folder.")
         print("\n".join(lines(config, planned(config))))
         return 0
     if args.executor != "local":

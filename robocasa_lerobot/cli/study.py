@@ -117,6 +117,8 @@ def run(args: argparse.Namespace) -> int:
         stored = {(run.experiment, run.seed): one for run, one in there if one and stands_for(one.about, run)}
         write_page(shown, stored, sets, results, args.page or results / "results.md")
 
+    if args.report and not results.is_dir():
+        raise UserError(f"--report makes a page of what is in --results, and {results} is no folder.")
     wanted = [] if args.report else runs_of(list(parts.values()), root, configs, *asked)
     if wanted:
         check_results(whole, results)

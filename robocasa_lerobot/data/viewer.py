@@ -8,11 +8,25 @@
 
 from __future__ import annotations
 
+import argparse
+import importlib.util
+from pathlib import Path
 from typing import Any
 
 
 def main() -> None:
-    """Run the viewer with the arguments of this process."""
+    """Run the viewer with the arguments of this process.
+
+    Raises:
+        SystemExit: `--root` is no dataset, which LeRobot would create and look for on the hub, or rerun is missing.
+    """
+    parser = argparse.ArgumentParser(add_help=False, allow_abbrev=False)
+    parser.add_argument("--root", type=Path)
+    root = parser.parse_known_args()[0].root
+    if root is not None and not (root / "meta" / "info.json").is_file():
+        raise SystemExit(f"--root {root}: found no meta/info.json there, expected the folder of a LeRobotDataset v3.0.")
+    if root is not None and importlib.util.find_spec("rerun") is None:
+        raise SystemExit("rerun is missing: uv pip install --python .venv/bin/python 'rerun-sdk>=0.24,<0.34'")
     from lerobot.scripts import lerobot_dataset_viz
 
     allow_none()

@@ -17,7 +17,6 @@ from robocasa_lerobot.progress import Bar
 from robocasa_lerobot.study.runs import Run
 from robocasa_lerobot.study.settings import PartConfig, StudyConfig
 from robocasa_lerobot.study.sharing import threads_of_each
-from robocasa_lerobot.training.config.experiment import load_experiment
 from robocasa_lerobot.training.planning.evaluations import FINISHED, FOLDER, PlannedEvaluation, plan_evaluations
 from robocasa_lerobot.training.planning.plan import PhasePlan, plan_experiment
 
@@ -135,7 +134,7 @@ class _Plan:
 
 def _planned(run: Run, pixels: int | None, measured_steps: int, measured: dict[str, float | str]) -> _Plan:
     sizes = () if pixels is None else (f"--loader.image_size={pixels}",)
-    experiment = load_experiment(run.write_file(), sizes, run.scale)
+    experiment = run.loaded(sizes)
     needs, _ = needs_of(experiment, parse_episodes(run.episodes) if run.episodes else {})
     phases = plan_experiment(experiment, measured_steps=measured_steps, measured=measured)
     evaluations = plan_evaluations(experiment, [plan.phase for plan in phases if not plan.left_out])

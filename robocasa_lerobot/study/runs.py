@@ -100,6 +100,18 @@ class Run:
 
     def write_file(self) -> Path:
         """Write that file and return its path."""
+        self.file.parent.mkdir(parents=True, exist_ok=True)
+        write_text(self.file, self._content())
+        return self.file
+
+    def loaded(self, overrides: Sequence[str] = ()) -> ExperimentConfig:
+        """What that file says, which need not be there: a plan leaves nothing beside trainings that run."""
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder) / self.file.name
+            write_text(file, self._content())
+            return load_experiment(file, overrides, self.scale)
+
+    def _content(self) -> str:
         # Other trials with each seed: three trainings tried in the same kitchens would say less.
         phases = [
             {"name": phase.name, "evaluations": [f"{text} --seed={self.seed}" for text in phase.evaluations]}
@@ -111,9 +123,7 @@ class Run:
             "output_dir": str(self.folder),
             "phases": phases,
         }
-        self.file.parent.mkdir(parents=True, exist_ok=True)
-        write_text(self.file, yaml.safe_dump(content, sort_keys=False))
-        return self.file
+        return yaml.safe_dump(content, sort_keys=False)
 
     def commands(self, workers: int | None) -> list[list[str]]:
         """Arguments of `robocasa-lerobot` that make its data, and then train each phase and try what it has learnt.

@@ -14,6 +14,7 @@ from typing import Any
 import pytest
 
 from robocasa_lerobot import __version__, cli
+from robocasa_lerobot.config_files import configs_folder
 from robocasa_lerobot.errors import UserError
 
 REPOSITORY = Path(__file__).parents[2]
@@ -174,3 +175,29 @@ def test_what_would_be_left_out_without_a_word_is_told(
     assert cli.main(words) == 2
     assert said in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
+
+
+def test_misspelt_options_are_told_with_the_closest(capsys: pytest.CaptureFixture[str]) -> None:
+    """Also where argparse would miss what was meant by it; hyphens and underscores are the same."""
+    assert cli.main(["demos", "--task=OpenDrawer", "--out=x"]) == 2
+    assert "robocasa-lerobot demos: unknown option '--task'. Did you mean '--tasks'?" in capsys.readouterr().err
+    assert cli.main(["study", "--plan", "--at-once=0"]) == 2
+    assert "--at_once is 0" in capsys.readouterr().err
+    assert cli.main(["eval", "--env.task=OpenDrawer", "--policy=zero"]) == 2
+    assert "unknown setting 'env.task'. Did you mean 'env.tasks'" in capsys.readouterr().err
+    assert cli.main(["eval", "--env.tasks=OpenDrawer", "--policy=zero", "--check", "--shard=5/4"]) == 2
+    assert "expected I/N" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("file", "words"),
+    [
+        ("policies/act.yaml", "with `type` it is a policy's settings"),
+        ("evaluations/quick.yaml", "with `trials` it is an evaluation"),
+        ("mixtures/demo_pretrain.yaml", "with `members` it is a mixture"),
+        ("study.yaml", "with `parts` it is a study"),
+    ],
+)
+def test_a_file_of_another_kind_is_told(file: str, words: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["train", f"--config_path={configs_folder() / file}"]) == 2
+    assert words in capsys.readouterr().err

@@ -23,6 +23,8 @@ from lerobot.datasets.dataset_metadata import CODEBASE_VERSION
 
 from robocasa_lerobot.convert import pipeline
 from robocasa_lerobot.convert.pipeline import ConversionResult, convert
+from robocasa_lerobot.convert.reading.hdf5 import SourceError
+from robocasa_lerobot.convert.reading.inputs import demo_files
 from robocasa_lerobot.convert.settings import ConversionSettings, Plan
 from robocasa_lerobot.convert.verify import verify
 from robocasa_lerobot.convert.writing import card
@@ -182,3 +184,17 @@ def test_publishing_tags_the_version_that_lerobot_asks_for() -> None:
     command = f"hf repos tag create OWNER/NAME {CODEBASE_VERSION} --repo-type dataset"
     assert command in (Path(__file__).parents[2] / "docs" / "data.md").read_text(encoding="utf-8")
     assert command in (card.__doc__ or "")
+
+
+def test_a_folder_stands_for_the_files_in_it(tmp_path: Path) -> None:
+    for name in ("b.hdf5", "a.hdf5", "notes.txt"):
+        (tmp_path / name).touch()
+    (tmp_path / "data" / "meta").mkdir(parents=True)
+    (tmp_path / "data" / "meta" / "info.json").touch()
+    (tmp_path / "empty").mkdir()
+    found = demo_files([tmp_path, tmp_path / "data", tmp_path / "b.hdf5"])
+    assert found == [tmp_path / name for name in ("a.hdf5", "b.hdf5", "data", "b.hdf5")]
+    with pytest.raises(SourceError, match="is a folder without HDF5 files, and no dataset either"):
+        demo_files([tmp_path / "empty"])
+    with pytest.raises(SourceError, match=r"a\.hdf does not exist; .*Did you mean 'a\.hdf5'"):
+        demo_files([tmp_path / "a.hdf"])

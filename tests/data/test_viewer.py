@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -37,3 +38,12 @@ def test_it_takes_the_viewers_own_arguments() -> None:
     command = [sys.executable, "-m", "robocasa_lerobot.data.viewer", "--help"]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     assert "--episode-index" in done.stdout
+
+
+def test_a_folder_that_is_no_dataset_is_said(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "robocasa_lerobot.data.viewer", "--repo-id=a/b", f"--root={tmp_path / 'dta'}"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert "found no meta/info.json there" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert not (tmp_path / "dta").exists()

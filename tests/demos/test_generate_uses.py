@@ -151,3 +151,15 @@ def test_uses_are_generated_and_replay(sources: Path, tmp_path: Path) -> None:
         assert found.deviation == 0.0
         with h5py.File(tmp_path / f"{task}.hdf5") as file:
             assert '"kind": "use"' in str(file["data/demo_0"].attrs["ep_meta"])
+
+
+@pytest.mark.slow
+def test_a_lever_that_comes_up_by_itself_is_waited_for(tmp_path: Path) -> None:
+    """The stage of GetToastedBread ends when the toaster has popped up, that of its source when its lever is down."""
+    folder, common = tmp_path / "sources", ["--episodes", "1", "--split", "pretrain"]
+    tasks = "TurnOnToaster,PickPlaceToasterToCounter"
+    assert cli.main(["demos", "--tasks", tasks, *common, "--seed", "100000", "--out", str(folder)]) == 0
+    assert cli.main(["prepare", str(folder)]) == 0
+    made = ["generate", "--source", str(folder), "--tasks", "GetToastedBread", "--out", str(tmp_path / "made")]
+    assert cli.main([*made, *common, "--seed", "200000"]) == 0
+    assert (tmp_path / "made" / "GetToastedBread.hdf5").is_file()

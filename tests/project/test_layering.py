@@ -33,7 +33,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "provenance": set(),
     "progress": set(),
     "quiet": set(),
-    "jobs": {"errors", "progress"},
+    "jobs": {"errors", "files", "progress"},
     "settings": {"errors"},
     "video": {"contract", "errors"},
     "wilson": {"errors"},

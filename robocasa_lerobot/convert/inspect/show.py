@@ -14,7 +14,7 @@ EXAMPLE = "robocasa-lerobot inspect demos.hdf5 --draft-mapping mapping.yaml"
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
-    parser.add_argument("paths", nargs="+", type=Path, metavar="FILE", help="HDF5 files or folders of datasets")
+    parser.add_argument("paths", nargs="+", type=Path, metavar="FILE", help="HDF5 files, folders of them, or datasets")
     parser.add_argument(
         "--draft-mapping",
         type=Path,
@@ -29,8 +29,9 @@ def run(args: argparse.Namespace) -> int:
     from robocasa_lerobot.convert.inspect.dataset import describe_dataset, inspect_dataset
     from robocasa_lerobot.convert.inspect.draft import draft_mapping
     from robocasa_lerobot.convert.inspect.hdf5 import describe, inspect_hdf5
-    from robocasa_lerobot.convert.reading.inputs import is_dataset
+    from robocasa_lerobot.convert.reading.inputs import demo_files, is_dataset
 
+    args.paths = demo_files(args.paths)
     if args.draft_mapping is not None:
         if len(args.paths) > 1 or is_dataset(args.paths[0]):
             raise UserError("--draft-mapping takes one HDF5 file; datasets need no mapping.")

@@ -23,21 +23,26 @@ def check_demo_file(path: Path) -> None:
     Raises:
         SourceError: there is none; it names the most alike.
     """
+    if path.is_dir():
+        raise SourceError(f"{path} is a folder without HDF5 files, and no dataset either: {INFO_FILE} is not there.")
     if not path.is_file():
         siblings = [p.name for p in path.parent.glob("*")] if path.parent.is_dir() else []
-        kind = "is a folder" if path.is_dir() else "does not exist"
-        raise SourceError(f"{path} {kind}; an HDF5 file is needed. {suggest(path.name, siblings)}")
+        raise SourceError(f"{path} does not exist; an HDF5 file is needed. {suggest(path.name, siblings)}")
 
 
-def check_demo_files(paths: Sequence[Path]) -> None:
-    """Check that each is a file or the folder of a dataset.
+def demo_files(paths: Sequence[Path]) -> list[Path]:
+    """Files and folders of datasets as they are given, and of other folders the HDF5 files in them, by name.
 
     Raises:
         SourceError: as `check_demo_file`.
     """
+    found: list[Path] = []
     for path in paths:
-        if not is_dataset(path):
+        inside = sorted(path.glob("*.hdf5")) if path.is_dir() and not is_dataset(path) else []
+        if not inside and not is_dataset(path):
             check_demo_file(path)
+        found += inside or [path]
+    return found
 
 
 def check_dataset(root: Path) -> None:

@@ -104,14 +104,15 @@ def press_lever(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
         yield from hold_hand(data, HandTarget(grip_position(data) + direction * 0.01, rotation), CLOSED, 4)
         back = HandTarget(before.position + (UP * 0.05) - rotation[:, 2] * 0.06, rotation)
         yield from move_hand(data, back, CLOSED, tolerance=0.03, max_steps=40)
-        yield from _wait_while_down(env, stage, fixture, part, back)
+        yield from wait_while_down(env, stage, back)
         if stage_done(env, stage):
             return
     raise SkillError(f"{part} of {fixture.name} is at {fixture.share(data, part):.0%} after {ATTEMPTS} attempts")
 
 
-def _wait_while_down(env: KitchenEnv, stage: Stage, fixture: Appliance, part: str, away: HandTarget) -> Iterator[Array]:
+def wait_while_down(env: KitchenEnv, stage: Stage, away: HandTarget) -> Iterator[Array]:
     """Keep the hand away while a lever that was pressed is held down, where the stage is done when it has come up."""
+    fixture, part = env.scene.fixture(stage.target, Appliance), env.scene.fill(stage.part)
     for _ in range(MOST_WAIT_STEPS):
         if stage_done(env, stage) or fixture.share(env.data, part) < HELD_DOWN:
             break

@@ -379,8 +379,7 @@ def sample(
     wanted = tuple(properties)
     factors = object_scale if isinstance(object_scale, int | float) else tuple(object_scale)
     asked: dict[str, Any] = {"properties": wanted, "exclude": exclude, "max_size": max_size, "scale": factors}
-    categories = pool(groups, **asked)
-    if not categories:
+    if not (categories := pool(groups, **asked)):
         raise UserError(
             f"no object category of groups {tuple(groups)} has the properties {sorted(wanted)} within {max_size} m, "
             f"without {sorted(exclude)}; widen the groups or the bounds."

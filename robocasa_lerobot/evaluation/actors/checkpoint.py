@@ -130,7 +130,7 @@ def find_pretrained(path: Path) -> Path:
             if not (candidate / _WEIGHTS).is_file():
                 raise CheckpointError(f"{candidate}: config.json without {_WEIGHTS}: {_incomplete(candidate)}")
             return candidate
-    what = "has no config.json" if path.is_dir() else "no such folder"
+    what = "has no config.json" if path.is_dir() else "is a file" if path.is_file() else "no such folder"
     found = sorted(str(p.parent) for p in path.glob("**/pretrained_model/config.json"))[:3] if path.is_dir() else []
     hint = f" Did you mean {' or '.join(found)}?" if found else ""
     known = ", ".join((*REFERENCE_POLICIES, "replay:FILE", "openpi://HOST:PORT", "gr00t://...", "vla_eval://..."))

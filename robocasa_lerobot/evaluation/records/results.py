@@ -336,7 +336,10 @@ def parse_line(line: str, where: str) -> RunHeader | TrialRecord:
     try:
         values = json.loads(line)
     except json.JSONDecodeError as error:
-        raise ResultsError(f"{where}: not a JSON object ({error}). Remove the line, or restore the file.") from error
+        remedy = "Remove the line, or restore the file."
+        if where.endswith(":1"):  # where the header is
+            remedy = f"Is it a run's folder, or its {TRIALS_FILE}?"
+        raise ResultsError(f"{where}: not a JSON object ({error}). {remedy}") from error
     if not isinstance(values, dict):
         raise ResultsError(f"{where}: found {type(values).__name__}, expected a JSON object.")
     if (found := values.get("schema")) not in READABLE_VERSIONS:

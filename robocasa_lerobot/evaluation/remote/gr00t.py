@@ -53,8 +53,8 @@ class Gr00tClient:
             import zmq
         except ImportError as error:
             raise UserError(
-                "gr00t:// needs pyzmq: install it, or this package with the extra gr00t: "
-                "`pip install 'robocasa-lerobot[gr00t]'`."
+                "gr00t:// needs pyzmq: `pip install pyzmq`, or this package with its extra gr00t, in its folder: "
+                "`pip install -e '.[gr00t]'`."
             ) from error
         self._zmq, self._address, self._timeouts = zmq, address, timeouts
         self._waiting, self._token, self._answered = waiting, token, False

@@ -159,8 +159,10 @@ def load_experiment(path: Path, overrides: Sequence[str] = (), scale: str | None
     Raises:
         UserError: a missing file, an unknown key (the closest match is named), or a value that does not fit.
     """
-    data = overlay.resolve(path, parse_overrides(overrides))
-    check_keys(ExperimentConfig, data, path.name)
+    changes = parse_overrides(overrides)
+    data = overlay.resolve(path, changes)
+    given = ", ".join(f"--{key}" for key, _ in changes)
+    check_keys(ExperimentConfig, data, path.name if not given else f"{path.name} with {given}")
     experiment = decode(ExperimentConfig, data, str(path))
     if scale is None:
         return experiment

@@ -15,6 +15,14 @@ from robocasa_lerobot.settings import Data, load_yaml, set_dotted
 
 FILE_KEYS = ("policy", "mixture")  # their value may be the name of a YAML file, or hold one under `file`
 BASE, WITHOUT, REGISTRY = "base", "without_phases", "registry"
+_OTHERS = {
+    "type": "a policy's settings, which an experiment names under `policy`",
+    "members": "a mixture, which a phase names under `mixture`",
+    "select": "a mixture, which a phase names under `mixture`",
+    "parts": "a study: `robocasa-lerobot study --config_path FILE`",
+    "datasets": "a registry of datasets, which an experiment names under `registry`",
+    "trials": "an evaluation: `robocasa-lerobot eval --config_path FILE`",
+}
 # Settings that identify a policy or mixture, and with each the settings of the base that it replaces; None is all.
 IDENTITY: dict[str, dict[str, tuple[str, ...] | None]] = {
     "policy": {"file": None, "type": None, "path": None},
@@ -104,11 +112,24 @@ def _set_registry(phase: Any, registry: str) -> None:
             selection.setdefault("registry", registry)
 
 
+def _refuse_others(path: Path, data: Data) -> None:
+    """Say what a file is that is no experiment, where its settings tell.
+
+    Raises:
+        UserError: it is a policy's, a mixture's, an evaluation's, a study's or a registry's.
+    """
+    for key, what in _OTHERS.items():
+        if key in data:
+            raise UserError(f"{path} is no experiment, which has `phases`: with `{key}` it is {what}.")
+
+
 def _load(path: Path, above: tuple[Path, ...]) -> Data:
     """A file laid over its bases, with the files that it names as paths that hold anywhere."""
     if path.resolve() in above:
         raise UserError(f"{path} is its own base, through {', '.join(str(p.name) for p in above)}.")
     data = load_yaml(path)
+    if "phases" not in data and BASE not in data:
+        _refuse_others(path, data)
     bases, without = data.pop(BASE, None) or [], data.pop(WITHOUT, None) or []
     own = _at_file_keys(data, functools.partial(_anchored, folder=path.parent))
     if isinstance(own.get(REGISTRY), str) and own[REGISTRY] != ROBOCASA365:
