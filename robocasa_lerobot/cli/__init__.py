@@ -68,6 +68,16 @@ SUBCOMMANDS: dict[str, Subcommand] = {
 }
 
 
+def _about_path(error: OSError) -> str:
+    """What is wrong with a path, and with which part of it."""
+    path = Path(os.fsdecode(error.filename))
+    if isinstance(error, NotADirectoryError | FileExistsError):
+        blocking = next((part for part in (path, *path.parents) if part.is_file()), None)
+        if blocking is not None:
+            return f"{blocking} is a file, where a folder is needed. Choose another name, or remove it."
+    return f"{error.filename}: {error.strerror}."
+
+
 def _nobody_reads() -> bool:
     """Whether standard output goes to a program that has ended, such as `head`; then nothing is written there again."""
     try:
@@ -189,7 +199,7 @@ def main(argv: Sequence[str] | None = None, own_process: bool | None = None) -> 
     except _NAMED as error:
         if error.filename is None:
             raise
-        print(f"robocasa-lerobot {name}: {error.filename}: {error.strerror}.", file=sys.stderr)
+        print(f"robocasa-lerobot {name}: {_about_path(error)}", file=sys.stderr)
         return 2
     except OSError as error:
         if error.errno not in _FULL:

@@ -114,7 +114,8 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         if render_mode not in (None, "rgb_array"):
             raise UnknownNameError("render mode", str(render_mode), ["rgb_array"])
         if image_size < 1 or (horizon is not None and horizon < 1):
-            raise UserError(f"image_size ({image_size}) and horizon ({horizon}) must be at least 1.")
+            name, found = ("image_size", image_size) if image_size < 1 else ("horizon", horizon)
+            raise UserError(f"{name}: found {found}, expected at least 1.")
         if render_device is not None:
             gl.check_device(render_device)
         self.task = self._declared.name
@@ -374,9 +375,8 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             self._renderer = None
 
     def _observe(self) -> Observation:
-        if not self.cameras:
-            pictures: Pictures = {}
-        else:
+        pictures: Pictures = {}
+        if self.cameras:
             if self.render_observations or not self._pictures:
                 started = time.perf_counter()
                 self._pictures = take_pictures(self._open_renderer(), self.data, self.cameras, **self._kinds)

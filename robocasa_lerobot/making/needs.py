@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from robocasa_lerobot.data.mixture_config import MixtureConfig
-from robocasa_lerobot.data.registry.published import DEMONSTRATIONS, DatasetEntry, dataset_version
+from robocasa_lerobot.data.registry.published import DEMONSTRATIONS, FEWER, DatasetEntry, dataset_version
 from robocasa_lerobot.data.registry.registry import Registry, missing_datasets, open_registry, select_datasets
 from robocasa_lerobot.data.registry.registry_file import TASK, RegisteredDataset
 from robocasa_lerobot.errors import UnknownNameError, UserError
@@ -120,7 +120,8 @@ def _needs_of_entry(entry: DatasetEntry, registry: Registry, numbers: Mapping[st
     """The need of a registry's entry; before it, that of the dataset that is drawn again for it."""
     dataset, root = entry.registered, Path(registry.config.root)
     if dataset is None:
-        group, count = f"published {entry.split}, {entry.source}", DEMONSTRATIONS.get((entry.split, entry.source))
+        group, kind = f"published {entry.split}, {entry.source}", (entry.split, entry.source)
+        count = FEWER.get((*kind, entry.task), DEMONSTRATIONS.get(kind))
         return [Need(group, entry.task, entry.split, entry.source, entry.root, entry.missing, count, None, root)]
     need = Need(dataset.path, entry.task, dataset.split, dataset.source, entry.root, entry.missing, registry_root=root)
     if dataset.make is None:

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from robocasa_lerobot import cli
+
 PROGRAM = """
 import sys
 from robocasa_lerobot.cli import main
@@ -39,3 +41,13 @@ def test_what_is_not_there_is_named_at_once(command: str, tmp_path: Path) -> Non
     assert done.stdout.split() == ["2"], done.stderr
     assert "nowhere" in done.stderr
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("command", [["demos", "--tasks=OpenDrawer"], ["gallery", "--tasks=OpenDrawer"]])
+def test_a_file_where_a_folder_is_needed(
+    command: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "out").write_text("notes")
+    assert cli.main([*command, f"--out={tmp_path / 'out'}"]) == 2
+    assert f"{tmp_path / 'out'} is a file, where a folder is needed." in capsys.readouterr().err
+    assert (tmp_path / "out").read_text() == "notes"

@@ -182,10 +182,11 @@ def _channels_last(feature: dict[str, Any]) -> dict[str, Any]:
 def _check_is_dataset(root: Path) -> None:
     info = root / "meta" / "info.json"
     if not info.is_file():
-        hint = f" It has {sorted(p.name for p in root.iterdir())[:5]}." if root.is_dir() else ""
+        inside = sorted(p.name for p in root.iterdir())[:5] if root.is_dir() else None
+        hint = "" if inside is None else f" The folder has {', '.join(inside)}." if inside else " The folder is empty."
         raise UserError(
             f"no dataset at {root} (no meta/info.json).{hint} Record with `robocasa-lerobot demos` and convert with "
-            "`robocasa-lerobot convert`, or correct the mixture's `root`."
+            "`robocasa-lerobot convert` (the demo's: `make demo` does both), or correct the mixture's `root`."
         )
     version = json.loads(info.read_text()).get("codebase_version")
     if version != "v3.0":

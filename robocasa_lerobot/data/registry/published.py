@@ -49,12 +49,13 @@ DOWNLOADS: dict[tuple[str, str], str] = {
     ("pretrain", "mg"): "python -m robocasa.scripts.download_datasets --split pretrain --source mimicgen",
     ("target", "human"): "python -m robocasa.scripts.download_datasets --split target --source human",
 }
-# Demonstrations of each task; OpenCabinet has half as many of MimicGen's.
+# Demonstrations of each task, and where a task has another number.
 DEMONSTRATIONS: dict[tuple[str, str], int] = {
     ("pretrain", "human"): 100,
     ("pretrain", "mg"): 10_000,
     ("target", "human"): 500,
 }
+FEWER = {("pretrain", "mg", "OpenCabinet"): 5_000}
 PUBLISHED_VIEWS = "lerobot"  # last name of the folders that are downloads
 
 
