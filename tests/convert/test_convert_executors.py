@@ -105,6 +105,6 @@ def test_ray_is_asked_for_only_where_it_is_installed(tmp_path: Path) -> None:
         assert leftovers(tmp_path / "out") == ["out"]
 
 
-def test_misspelt_options_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(SystemExit):
-        cli.main(["convert", "a.hdf5", "--out", str(tmp_path / "out"), "--slurm.partitoin", "cpu"])
+def test_misspelt_options_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["convert", "a.hdf5", "--out", str(tmp_path / "out"), "--slurm.partitoin", "cpu"]) == 2
+    assert "Did you mean '--slurm.partition'" in capsys.readouterr().err
