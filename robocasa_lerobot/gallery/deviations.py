@@ -34,6 +34,8 @@ this page.
 ## In many tasks
 - Objects: the {extended} categories of which RoboCasa365 has generated models only are drawn like the others, {of} in
   all; its default registries leave them out.
+- Nor does a scene have two objects of one category by chance, which an instruction could not tell apart, but in tasks
+  that are about several alike.
 - Being inside ({inside} tasks): the published tolerance is 0.05 over the length of the region's edge, so that the
   shorter the edge, the farther an object may stand out, half a metre in drawers; here it is {margin} m everywhere, and
   the object's own origin is inside.
