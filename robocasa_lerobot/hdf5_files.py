@@ -1,4 +1,4 @@
-"""HDF5 files that appear whole or not at all, and whose faults are those of the disk."""
+"""HDF5 files that appear whole or not at all, and whose faults are those of the disk; those of a folder."""
 
 from __future__ import annotations
 
@@ -11,6 +11,11 @@ from pathlib import Path
 import h5py
 
 from robocasa_lerobot.files import written_aside
+
+
+def hdf5_files_of(path: Path) -> list[Path]:
+    """The HDF5 files in a folder, by name; a path that is no folder stands for itself."""
+    return sorted(path.glob("*.hdf5")) if path.is_dir() else [path]
 
 
 class _Shielded(io.FileIO):

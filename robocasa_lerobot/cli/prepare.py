@@ -54,11 +54,12 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _prepare_foreign(args: argparse.Namespace, total: int) -> int:
+    from robocasa_lerobot.hdf5_files import hdf5_files_of
     from robocasa_lerobot.making.foreign_sources import prepare_foreign
     from robocasa_lerobot.progress import Bar
 
     bodies = [name.strip() for name in args.bodies.split(",")]
-    files = sorted({file for path in args.paths for file in (path.glob("*.hdf5") if path.is_dir() else [path])})
+    files = sorted({file for path in args.paths for file in hdf5_files_of(path)})
     infos = (info for file in files for info in prepare_foreign(file, bodies, args.asset_root))
     ready = sum(1 for _ in Bar(infos, total=total, unit="demo"))
     print(

@@ -24,6 +24,7 @@ from robocasa_lerobot.envs.predicates import parts_with_memory
 from robocasa_lerobot.envs.scene.reset_noise import InitialNoise
 from robocasa_lerobot.envs.tasks.task import Task
 from robocasa_lerobot.errors import LackingMachineError, UserError
+from robocasa_lerobot.hdf5_files import hdf5_files_of
 from robocasa_lerobot.jobs.as_completed import as_they_end
 
 Array = NDArray[np.float64]
@@ -116,8 +117,7 @@ def demonstrations(paths: Iterable[Path]) -> list[tuple[Path, str]]:
     found: list[tuple[Path, str]] = []
     seen: set[Path] = set()
     for path in paths:
-        files = sorted(path.glob("*.hdf5")) if path.is_dir() else [path]
-        for file in files:
+        for file in hdf5_files_of(path):
             if file.resolve() in seen:
                 continue
             seen.add(file.resolve())

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
+from robocasa_lerobot.benchmark import published
 from robocasa_lerobot.benchmark.tasks import task_facts
 from robocasa_lerobot.contract import IMAGE_SIZE
 from robocasa_lerobot.data.registry.recipes import REPLAY
@@ -26,7 +27,6 @@ STEPS_PER_SECOND: Mapping[int, float] = {64: 167.0, 256: 94.0}
 # Of one core, a small policy that drives before it is corrected (`benchmarks/results/scaling.json`: trials).
 DRIVEN_STEPS_PER_SECOND, DRIVEN_STEPS = 47.0, 175
 BYTES_PER_STEP = 6_000
-_MULTIPLIED_SECONDS = 1615 * 3600 / 595_000  # of MimicGen's published demonstrations: hours of all, and their number
 BYTES_PER_EPISODE = 500_000  # scene, textures and states, kept so that it can be drawn again
 
 
@@ -100,10 +100,11 @@ def published_hours(needs: Iterable[Need]) -> float:
     Source: the benchmark's table of data (`benchmark/published/data.json`).
     """
     facts = task_facts()
+    (multiplied,) = (row for row in published.read("data")["rows"] if row["source"] == "mg")
 
     def seconds(need: Need) -> float:
-        if need.source == "mg":
-            return _MULTIPLIED_SECONDS
+        if need.source == multiplied["source"]:
+            return float(multiplied["hours"] * 3600 / multiplied["demonstrations"])
         return facts[need.task].human_seconds if need.task in facts else 0.0
 
     return sum((need.demonstrations or 0) * seconds(need) for need in needs) / 3600

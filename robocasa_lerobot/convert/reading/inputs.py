@@ -8,6 +8,7 @@ from pathlib import Path
 from robocasa_lerobot.convert.reading.hdf5 import SourceError
 from robocasa_lerobot.convert.record_files import CONVERSION_FILE, META_FOLDER
 from robocasa_lerobot.errors import UserError, suggest
+from robocasa_lerobot.hdf5_files import hdf5_files_of
 
 INFO_FILE = "meta/info.json"  # of LeRobot datasets of all versions
 
@@ -38,10 +39,10 @@ def demo_files(paths: Sequence[Path]) -> list[Path]:
     """
     found: list[Path] = []
     for path in paths:
-        inside = sorted(path.glob("*.hdf5")) if path.is_dir() and not is_dataset(path) else []
-        if not inside and not is_dataset(path):
-            check_demo_file(path)
-        found += inside or [path]
+        files = [path] if is_dataset(path) else hdf5_files_of(path)
+        for file in [] if is_dataset(path) else files or [path]:
+            check_demo_file(file)
+        found += files
     return found
 
 

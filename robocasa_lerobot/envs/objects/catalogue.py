@@ -297,11 +297,7 @@ def scaled(item: Instance, factors: float | Iterable[float]) -> Instance:
 
 
 def _three(factors: float | Iterable[float]) -> list[float]:
-    """Factors of x, y and z.
-
-    Raises:
-        UserError: not one or three positive factors.
-    """
+    """Factors of x, y and z, or a UserError where they are not one or three positive ones."""
     values = [float(factors)] * 3 if isinstance(factors, int | float) else [float(f) for f in factors]
     if len(values) != 3 or min(values) <= 0:
         raise UserError(f"object scale {values}: expected one positive factor, or three of them for x, y and z.")
@@ -337,14 +333,19 @@ def pool(
     factors = _three(scale)
     unwanted = {c.name for group in exclude for c in categories_of(group)}
     found = {c.name: c for group in groups for c in categories_of(group) if c.name not in unwanted}
-    found = {name: c for name, c in found.items() if name in groups or with_added or not c.added}
     wanted = set(properties)
 
     def fits(category: Category) -> bool:
         sizes = zip(category.largest, factors, max_size, strict=True)
         return all(bound is None or size * factor <= bound for size, factor, bound in sizes)
 
-    return tuple(found[name] for name in sorted(found) if wanted <= found[name].properties and fits(found[name]))
+    fitting = tuple(found[name] for name in sorted(found) if wanted <= found[name].properties and fits(found[name]))
+    return fitting if with_added else _asked_for(fitting, groups)
+
+
+def _asked_for(categories: Iterable[Category], groups: Collection[str]) -> tuple[Category, ...]:
+    """Without those that we added, but for those that are named themselves."""
+    return tuple(category for category in categories if not category.added or category.name in groups)
 
 
 def sample(
@@ -378,14 +379,13 @@ def sample(
     """
     wanted = tuple(properties)
     factors = object_scale if isinstance(object_scale, int | float) else tuple(object_scale)
-    asked: dict[str, Any] = {"properties": wanted, "exclude": exclude, "max_size": max_size, "scale": factors}
-    if not (categories := pool(groups, **asked)):
+    drawn = pool(groups, properties=wanted, exclude=exclude, max_size=max_size, scale=factors, with_added=True)
+    if not (categories := _asked_for(drawn, groups)):
         raise UserError(
             f"no object category of groups {tuple(groups)} has the properties {sorted(wanted)} within {max_size} m, "
             f"without {sorted(exclude)}; widen the groups or the bounds."
         )
     # One of ours is drawn again, so that most scenes of a seed are as they were when those were drawn, too.
-    drawn = pool(groups, **asked, with_added=True)
     category = drawn[int(rng.integers(len(drawn)))]
     if category not in categories:
         category = categories[int(rng.integers(len(categories)))]

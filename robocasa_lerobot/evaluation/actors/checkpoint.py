@@ -14,6 +14,7 @@ from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.evaluation.records.results import PolicyInfo
 from robocasa_lerobot.evaluation.remote.introduction import RemotePolicy
 from robocasa_lerobot.policies.origin import ORIGIN_FILE, Origin, read_origin
+from robocasa_lerobot.policies.weight_files import WEIGHTS, adapter_alone
 
 REFERENCE_POLICIES = ("demonstrator", "random", "zero")
 REPLAY = "replay"  # written replay:FILE
@@ -21,7 +22,6 @@ REPLAY = "replay"  # written replay:FILE
 _ABOUT_TRAINING = ("train_config.json", ORIGIN_FILE)
 _PREPROCESSOR, _RENAMES = "policy_preprocessor.json", "rename_observations_processor"  # LeRobot's names
 _PICTURE_PREFIX = "observation.image"
-_WEIGHTS, _ADAPTER = "model.safetensors", "adapter_model.safetensors"
 
 
 class CheckpointError(UserError):
@@ -127,23 +127,15 @@ def find_pretrained(path: Path) -> Path:
     """The `pretrained_model` folder at `path`, at a checkpoint, or under the last checkpoint of a phase."""
     for candidate in (path, path / "pretrained_model", path / "checkpoints" / "last" / "pretrained_model"):
         if (candidate / "config.json").is_file():
-            if not (candidate / _WEIGHTS).is_file():
-                raise CheckpointError(f"{candidate}: config.json without {_WEIGHTS}: {_incomplete(candidate)}")
+            if not (candidate / WEIGHTS).is_file():
+                reason = adapter_alone(candidate) or "the checkpoint is incomplete."
+                raise CheckpointError(f"{candidate}: config.json without {WEIGHTS}: {reason}")
             return candidate
     what = "has no config.json" if path.is_dir() else "is a file" if path.is_file() else "no such folder"
     found = sorted(str(p.parent) for p in path.glob("**/pretrained_model/config.json"))[:3] if path.is_dir() else []
     hint = f" Did you mean {' or '.join(found)}?" if found else ""
     known = ", ".join((*REFERENCE_POLICIES, "replay:FILE", "openpi://HOST:PORT", "gr00t://...", "vla_eval://..."))
     raise CheckpointError(f"policy.path {path}: {what}; expected a pretrained_model folder, or one of {known}.{hint}")
-
-
-def _incomplete(folder: Path) -> str:
-    if (folder / _ADAPTER).is_file():
-        return (
-            f"it holds an adapter of PEFT alone ({_ADAPTER}). Merge it into its policy and save that: "
-            "`PeftModel.from_pretrained(policy, folder).merge_and_unload().save_pretrained(...)`."
-        )
-    return "the checkpoint is incomplete."
 
 
 def fingerprint(folder: Path) -> str:

@@ -28,13 +28,13 @@ from robocasa_lerobot.errors import UnknownNameError, UserError
 from robocasa_lerobot.policies.common.statistics import CONSTANT_RANGE, widen_constant_components
 from robocasa_lerobot.policies.needs import explained
 from robocasa_lerobot.policies.registry import register_policies
+from robocasa_lerobot.policies.weight_files import adapter_alone
 from robocasa_lerobot.training.setup.features import LEAVE_OUT, RENAME, fit_features, new_names, renamed_inputs
 from robocasa_lerobot.training.setup.features import check_features as _check_features
 from robocasa_lerobot.training.setup.kept import rename_kept
 
 _NO_FIELDS = ("type", "path", RENAME, LEAVE_OUT)  # settings of a policy that are no fields of its configuration
 _LOAD_TOKENIZERS = ("pi0", "pi05", "smolvla", "xvla")  # by name, in their processors
-_WEIGHTS, _ADAPTER = "model.safetensors", "adapter_model.safetensors"
 _NOT_LOADED = "Could not load state dict"
 MAPPING = "normalization_mapping"
 
@@ -151,8 +151,8 @@ def make_phase_policy(config: PreTrainedConfig, meta: MixtureMeta, checkpoint: P
 
 
 def _load(config: PreTrainedConfig, meta: MixtureMeta, checkpoint: Path) -> PreTrainedPolicy:
-    if not (checkpoint / _WEIGHTS).is_file() and (checkpoint / _ADAPTER).is_file():
-        raise UserError(f"{checkpoint} holds an adapter of PEFT alone ({_ADAPTER}): merge it into its policy first.")
+    if reason := adapter_alone(checkpoint):
+        raise UserError(f"{checkpoint}: {reason}")
     kwargs = {"dataset_stats": meta.stats, "dataset_meta": meta}
     said = io.StringIO()
     try:

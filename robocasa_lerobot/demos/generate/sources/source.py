@@ -21,6 +21,7 @@ from robocasa_lerobot.demos.generate.sources.uses import UNDER_WATER
 from robocasa_lerobot.demos.replay import demonstrations
 from robocasa_lerobot.envs.tasks.task import Stage
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.hdf5_files import hdf5_files_of
 
 type Stamp = tuple[tuple[str, int, int], ...]
 
@@ -167,7 +168,7 @@ def _alike(one: str, other: str) -> bool:
 def stamp_of(place: Path) -> Stamp:
     """Names, times and sizes of the files of a folder, or of one file: what is kept of others is read anew."""
     found = []
-    for file in sorted(place.glob("*.hdf5")) if place.is_dir() else [place]:
+    for file in hdf5_files_of(place):
         with contextlib.suppress(FileNotFoundError):
             status = file.stat()
             found.append((file.name, status.st_mtime_ns, status.st_size))
