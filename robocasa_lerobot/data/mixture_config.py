@@ -13,6 +13,8 @@ from robocasa_lerobot.errors import UnknownNameError, UserError
 # Exponent on the number of frames with which the published benchmark weights its datasets: P ~ L^0.4
 # (RoboCasa365's Diffusion Policy and pi0 trainers; its GR00T trainer comes to L^1.4).
 BENCHMARK_ALPHA = 0.4
+# What is drawn of a dataset: one of its frames, or one of its episodes and then one of that one's frames.
+DRAWN = ("frames", "episodes")
 ROBOCASA365 = "robocasa365"  # the registry of the published datasets, in `datasets/` of the working directory
 
 _COUNT = re.compile(r"(\d+)(?:_demos)?$")
@@ -110,7 +112,7 @@ class SelectionConfig:
 
 @dataclass
 class MixtureConfig:
-    """Datasets and how often each is drawn: a dataset by its weight, then one of its frames uniformly.
+    """Datasets and how often each is drawn: a dataset by its weight, then one of its frames or episodes uniformly.
 
     Attributes:
         members: the datasets; either all or none of them (and of `select`) have a `weight`.
@@ -119,14 +121,19 @@ class MixtureConfig:
         select: further members, by task set, split and source.
         shares: of each class (`group` of the members), such as `{real: 0.15, same_views: 0.3, other: 0.55}`; inside
             a class by `weight`, or equally without weights.
+        draw: of a dataset, `frames` (all alike) or `episodes` (all alike, and then the frames of the one that is
+            drawn), so that short episodes count more.
     """
 
     members: list[MemberConfig] = field(default_factory=list)
     alpha: float = BENCHMARK_ALPHA
     select: list[SelectionConfig] = field(default_factory=list)
     shares: dict[str, float] | None = None
+    draw: str = DRAWN[0]
 
     def __post_init__(self) -> None:
+        if self.draw not in DRAWN:
+            raise UnknownNameError("choice", self.draw, DRAWN, "(what a mixture may `draw` of a dataset)")
         parts: list[MemberConfig | SelectionConfig] = [*self.members, *self.select]
         if not parts:
             raise UserError(

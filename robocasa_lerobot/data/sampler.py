@@ -25,13 +25,17 @@ class FramePool:
     Attributes:
         starts: (runs,) first frame of each run, as an index of the dataset.
         lengths: (runs,) frames of each run.
+        of_episodes: (episodes,) frames of each episode, in the order of the runs; None: each run is an episode.
     """
 
     starts: NDArray[np.int64]
     lengths: NDArray[np.int64]
+    of_episodes: NDArray[np.int64] | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "ends", np.cumsum(self.lengths))
+        counts = self.lengths if self.of_episodes is None else self.of_episodes
+        object.__setattr__(self, "episode_ends", np.cumsum(counts))
 
     @property
     def size(self) -> int:
@@ -43,6 +47,19 @@ class FramePool:
         ends: NDArray[np.int64] = self.__dict__["ends"]
         run = np.searchsorted(ends, rank, side="right")
         return self.starts[run] + rank - (ends[run] - self.lengths[run])
+
+    def any_frame(self, unit: NDArray[np.float64]) -> NDArray[np.int64]:
+        """Dataset index of a frame for each of `unit` in [0, 1): all frames alike."""
+        return self.frame((unit * self.size).astype(np.int64))
+
+    def frame_of_any_episode(
+        self, episode_unit: NDArray[np.float64], frame_unit: NDArray[np.float64]
+    ) -> NDArray[np.int64]:
+        """Dataset index of a frame for each pair in [0, 1): all episodes alike, and in each all its frames."""
+        ends: NDArray[np.int64] = self.__dict__["episode_ends"]
+        episode = (episode_unit * len(ends)).astype(np.int64)
+        begin = np.where(episode > 0, ends[episode - 1], 0)
+        return self.frame(begin + (frame_unit * (ends[episode] - begin)).astype(np.int64))
 
 
 def mixture_probabilities(
@@ -80,24 +97,35 @@ def mixture_probabilities(
 class MixtureSampler:
     """Draws (member, frame) pairs: a member by its probability, then one of its frames uniformly.
 
+    With `episodes_first` one of its episodes uniformly, and then one of that one's frames.
     Position `p` uses the words of counter `p` of a Philox generator (Salmon et al. 2011, "Parallel random
     numbers: as easy as 1, 2, 3") keyed on the seed, so any position can be drawn alone and in any order.
     """
 
-    def __init__(self, pools: Sequence[FramePool], probabilities: NDArray[np.float64], seed: int) -> None:
+    def __init__(
+        self,
+        pools: Sequence[FramePool],
+        probabilities: NDArray[np.float64],
+        seed: int,
+        episodes_first: bool = False,
+    ) -> None:
         if len(pools) != len(probabilities):
             raise UserError(f"sampler: {len(pools)} pools but {len(probabilities)} probabilities.")
         self.pools, self.probabilities, self.seed = list(pools), probabilities, seed
+        self.episodes_first = episodes_first
         self._upper = np.cumsum(probabilities)
         self._upper[-1] = 1.0  # against rounding: a draw is always below it
 
     def draw(self, position: int, count: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Members (count,) and dataset frame indices (count,) of the samples `position .. position + count - 1`."""
         words = np.random.Philox(key=self.seed, counter=position).random_raw(_WORDS * count).reshape(count, _WORDS)
-        unit = (words[:, :2] >> np.uint64(11)).astype(np.float64) * _UNIT
+        unit = (words >> np.uint64(11)).astype(np.float64) * _UNIT
         members = np.searchsorted(self._upper, unit[:, 0], side="right").astype(np.int64)
         frames = np.empty(count, dtype=np.int64)
         for member in np.unique(members):
             chosen, pool = members == member, self.pools[member]
-            frames[chosen] = pool.frame((unit[chosen, 1] * pool.size).astype(np.int64))
+            if self.episodes_first:
+                frames[chosen] = pool.frame_of_any_episode(unit[chosen, 1], unit[chosen, 2])
+            else:
+                frames[chosen] = pool.any_frame(unit[chosen, 1])
         return members, frames

@@ -1,4 +1,4 @@
-"""Statistics of a mixture's frames in LeRobot's format, each frame weighted by how often the mixture draws it.
+"""Statistics of a mixture's frames in LeRobot's format, each frame weighted by how often the mixture draws its dataset.
 
 The data are read block by block, so that their number is not limited by memory.
 """

@@ -56,7 +56,7 @@ def without_held_out(
             apart.append(dataclasses.replace(plain, episodes=held.tolist(), frames=None))
     if not apart:
         return dataset, None
-    parts = (MixtureConfig(members=kept), MixtureConfig(members=apart))
+    parts = (MixtureConfig(members=kept, draw=dataset.config.draw), MixtureConfig(members=apart))
     return open_mixture(parts[0], loader, dataset.sources), open_mixture(parts[1], loader, dataset.sources)
 
 

@@ -11,6 +11,8 @@ from robocasa_lerobot import contract
 from robocasa_lerobot.data.fake import write_fake_dataset
 from robocasa_lerobot.data.mixture import MixtureDataset
 from robocasa_lerobot.data.mixture_config import MemberConfig, MixtureConfig
+from robocasa_lerobot.data.reading.decisions import frame_pool
+from robocasa_lerobot.data.sampler import MixtureSampler
 from robocasa_lerobot.errors import UnknownNameError, UserError
 
 LENGTH = 6
@@ -50,6 +52,21 @@ def test_samples_start_where_the_member_says_and_as_often(data: Path) -> None:
     for dropped, left in ((2, {3}), (4, {3}), (1, {3, 4})):  # an episode keeps its first frame of the kind
         members, frames = dataset.sampler(seed=0, drop_last_frames=dropped).draw(0, 5_000)
         assert set(frames[members == 1] % LENGTH) == left
+
+
+def test_an_episode_first_of_frames_of_a_kind(data: Path) -> None:
+    """Each episode as often as another, though one of them has but one frame of the kind left."""
+    source = mixture(data).sources[data / "corrected"]
+    wanted = np.zeros(3 * LENGTH, dtype=bool)
+    wanted[[0, 1, 3, LENGTH + 5]] = (
+        True  # two runs, a last frame, and none of the third
+    )
+    pool = frame_pool(source, np.arange(3), wanted, drop_last_frames=1)
+    assert pool.of_episodes is not None
+    assert pool.of_episodes.tolist() == [3, 1]
+    _, frames = MixtureSampler([pool], np.array([1.0]), seed=0, episodes_first=True).draw(0, 20_000)
+    shares = np.bincount(frames, minlength=3 * LENGTH) / 20_000
+    assert np.allclose(shares[[0, 1, 3, LENGTH + 5]], [1 / 6, 1 / 6, 1 / 6, 1 / 2], atol=0.015)
 
 
 def test_policies_do_not_see_who_decided(data: Path) -> None:

@@ -15,6 +15,7 @@ from robocasa_lerobot.data.fake import write_fake_dataset
 from robocasa_lerobot.data.mixture import MixtureDataset, StepBatches
 from robocasa_lerobot.data.mixture_config import LoaderConfig, MemberConfig, MixtureConfig
 from robocasa_lerobot.data.sampler import FramePool, MixtureSampler, mixture_probabilities
+from robocasa_lerobot.errors import UnknownNameError
 
 SIZES = ((1, 4), (2, 8), (4, 16))  # episodes, frames of each
 DRAWS = 40_000
@@ -128,6 +129,32 @@ def test_a_member_of_hundreds_is_found_by_its_probability() -> None:
     members, frames = MixtureSampler(pools, probabilities, seed=0).draw(0, 200_000)
     assert p_value(np.bincount(members, minlength=550), 200_000 * probabilities) > SIGNIFICANCE
     assert (frames < lengths[members]).all()
+
+
+def test_an_episode_first_makes_the_frames_of_short_ones_count_more() -> None:
+    """Episodes of 2, 30 and, in two runs with a gap, 8 frames; and a dataset that begins elsewhere."""
+    runs = FramePool(np.array([0, 2, 32, 40]), np.array([2, 30, 5, 3]), np.array([2, 30, 8]))
+    other = FramePool(np.array([10, 14]), np.array([4, 1]))
+    expected = np.zeros((2, 64))
+    expected[0, 0:2], expected[0, 2:32], expected[0, [*range(32, 37), 40, 41, 42]] = 1 / 6, 1 / 90, 1 / 24
+    expected[1, 10:14], expected[1, 14] = 1 / 8, 1 / 2
+    sampler = MixtureSampler([runs, other], np.array([0.6, 0.4]), seed=5, episodes_first=True)
+    members, frames = sampler.draw(0, DRAWS)
+    counts = np.bincount(members * 64 + frames, minlength=2 * 64).reshape(2, 64)
+    expected *= DRAWS * np.array([[0.6], [0.4]])
+    assert p_value(counts, expected) > SIGNIFICANCE
+    together = np.concatenate([sampler.draw(at, 7)[1] for at in range(0, 70, 7)])
+    np.testing.assert_array_equal(together, frames[:70])  # any position alone
+
+
+def test_a_mixture_draws_episodes_first_where_it_says_so(roots: list[Path]) -> None:
+    frames, episodes = open_datasets(roots), open_datasets(roots, draw="episodes")
+    assert episodes.sampler(seed=0).episodes_first
+    assert not frames.sampler(seed=0).episodes_first
+    assert frames.selection_fingerprint != episodes.selection_fingerprint
+    assert "an episode first" in episodes.describe()
+    with pytest.raises(UnknownNameError, match="Did you mean 'episodes'"):
+        MixtureConfig([MemberConfig("x")], draw="episode")
 
 
 @given(

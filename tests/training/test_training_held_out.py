@@ -26,7 +26,9 @@ def test_held_out_episodes_are_not_trained_on(tmp_path: Path, data: Path) -> Non
     overrides = ["--defaults.steps=2", "--defaults.held_out={share: 0.25, every: 1, samples: 8}"]
     experiment = tiny(tmp_path, data, overrides=overrides)
     mixture = open_mixture(experiment.phases[0].mixture, experiment.loader)
+    mixture.config.draw = "episodes"
     kept, apart = without_held_out(mixture, HeldOutConfig(share=0.25), experiment.loader, seed=0)
+    assert kept.config.draw == "episodes"
     assert mixture.sources == kept.sources == apart.sources  # opened once
     numbers = [dataset.config.members[0].episodes or [] for dataset in (kept, apart)]
     assert sorted([*numbers[0], *numbers[1]]) == list(range(8))

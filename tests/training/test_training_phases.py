@@ -151,12 +151,13 @@ def test_pool_needs_the_earlier_data(tmp_path: Path, data: Path, pretrained: Pat
 
 
 def test_replay_draws_its_share_from_earlier_phases(tmp_path: Path, data: Path, other: Path) -> None:
-    mixture = f"{{members: [{{root: {other}}}]}}"
+    mixture = f"{{members: [{{root: {other}}}], draw: episodes}}"
     overrides = [f"--phases.finetune.mixture={mixture}", "--phases.finetune.replay.share=0.25"]
     experiment = tiny(tmp_path, data, overrides=overrides)
     dataset = joining.open_phase_data(experiment, experiment.phases[1])
     assert [member.root for member in dataset.config.members] == [str(other), str(data)]
     np.testing.assert_allclose(dataset.probabilities, [0.75, 0.25])
+    assert dataset.sampler(seed=0).episodes_first  # as the phase's own data
     members, _ = dataset.sampler(seed=0).draw(0, 4000)
     assert np.mean(members == 1) == pytest.approx(0.25, abs=0.03)  # 4 standard deviations
     with pytest.raises(UserError, match="builds on no earlier phase"):

@@ -62,11 +62,15 @@ def frame_pool(
     if wanted is None:
         return FramePool(starts, lengths)
     runs: list[tuple[int, int]] = []
+    of_episodes: list[int] = []
     for start, end, length in zip(starts.tolist(), ends.tolist(), lengths.tolist(), strict=True):
         of_episode = wanted[start:end]
         edges = np.flatnonzero(np.diff(np.concatenate([[False], of_episode[:length], [False]]).astype(np.int8)))
-        runs += [(start + begin, stop - begin) for begin, stop in edges.reshape(-1, 2).tolist()]
-        if not len(edges) and of_episode.any():
-            runs.append((start + int(of_episode.argmax()), 1))
+        new = [(start + begin, stop - begin) for begin, stop in edges.reshape(-1, 2).tolist()]
+        if not new and of_episode.any():
+            new = [(start + int(of_episode.argmax()), 1)]
+        if new:
+            runs += new
+            of_episodes.append(sum(length for _, length in new))
     pool = np.array(runs, dtype=np.int64).reshape(-1, 2)
-    return FramePool(pool[:, 0], pool[:, 1])
+    return FramePool(pool[:, 0], pool[:, 1], np.array(of_episodes, dtype=np.int64))

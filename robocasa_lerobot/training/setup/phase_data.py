@@ -61,7 +61,7 @@ def pooled(
 def joined(datasets: Sequence[MixtureDataset], shares: Sequence[float]) -> MixtureConfig:
     """One mixture that draws from each of several by its share, and inside each as it does.
 
-    What several have is one member of it, with the weights added.
+    What several have is one member of it, with the weights added. Of each it draws frames or episodes as of the first.
     """
     members: dict[str, MemberConfig] = {}
     for dataset, share in zip(datasets, shares, strict=True):
@@ -69,4 +69,4 @@ def joined(datasets: Sequence[MixtureDataset], shares: Sequence[float]) -> Mixtu
             plain = dataclasses.replace(member, weight=None, group=None)
             weight = members[repr(plain)].weight or 0.0 if repr(plain) in members else 0.0
             members[repr(plain)] = dataclasses.replace(plain, weight=weight + float(probability * share))
-    return MixtureConfig(members=list(members.values()))
+    return MixtureConfig(members=list(members.values()), draw=datasets[0].config.draw)
