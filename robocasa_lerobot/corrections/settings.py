@@ -22,6 +22,7 @@ from robocasa_lerobot.evaluation.actors.checkpoint import (
     REFERENCE_POLICIES,
     REPLAY,
     PolicySource,
+    check_name,
     find_pretrained,
     read_source,
 )
@@ -144,6 +145,7 @@ def _source(policy: str) -> PolicySource:
     if policy in REFERENCE_POLICIES or policy.startswith(f"{REPLAY}:"):
         source = read_source(policy)
     else:
+        check_name(policy)
         folder = find_pretrained(Path(policy)).resolve()  # `last` may become another folder
         source = _read(policy, folder, max(file.stat().st_mtime_ns for file in folder.iterdir()))
     if source.type in (REPLAY, "demonstrator"):

@@ -190,6 +190,30 @@ def test_misspelt_options_are_told_with_the_closest(capsys: pytest.CaptureFixtur
 
 
 @pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ("rndom", "Did you mean 'random'?"),
+        ("Demonstrator", "Did you mean 'demonstrator'?"),
+        ("replai:demo.hdf5", "Did you mean 'replay:FILE'?"),
+        ("opnpi://127.0.0.1:8000", "Did you mean 'openpi'?"),
+    ],
+)
+def test_misspelt_policies_are_told_before_anything_runs(
+    given: str, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Where no checkpoint is needed yet as well; a folder that a training will write may be named there."""
+    monkeypatch.chdir(tmp_path)
+    check = ["eval", "--env.tasks=OpenDrawer", "--check"]
+    assert cli.main([*check, f"--policy={given}"]) == 2
+    assert said in capsys.readouterr().err
+    if "://" not in given:
+        assert cli.main(["correct", f"--policy={given}", "--tasks=OpenDrawer", "--out=x"]) == 2
+        assert said in capsys.readouterr().err
+    for path in ("outputs/random", "pretrained_model", "zero"):
+        assert cli.main([*check, f"--policy={path}"]) == 0
+
+
+@pytest.mark.parametrize(
     ("file", "words"),
     [
         ("policies/act.yaml", "with `type` it is a policy's settings"),

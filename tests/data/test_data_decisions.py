@@ -58,9 +58,7 @@ def test_an_episode_first_of_frames_of_a_kind(data: Path) -> None:
     """Each episode as often as another, though one of them has but one frame of the kind left."""
     source = mixture(data).sources[data / "corrected"]
     wanted = np.zeros(3 * LENGTH, dtype=bool)
-    wanted[[0, 1, 3, LENGTH + 5]] = (
-        True  # two runs, a last frame, and none of the third
-    )
+    wanted[[0, 1, 3, LENGTH + 5]] = True  # two runs, a last frame, and none of the third
     pool = frame_pool(source, np.arange(3), wanted, drop_last_frames=1)
     assert pool.of_episodes is not None
     assert pool.of_episodes.tolist() == [3, 1]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import hashlib
 import json
 from collections.abc import Mapping
@@ -10,8 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from robocasa_lerobot import contract
-from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.errors import UnknownNameError, UserError
 from robocasa_lerobot.evaluation.records.results import PolicyInfo
+from robocasa_lerobot.evaluation.remote.address import is_address, parse_address
 from robocasa_lerobot.evaluation.remote.introduction import RemotePolicy
 from robocasa_lerobot.policies.origin import ORIGIN_FILE, Origin, read_origin
 from robocasa_lerobot.policies.weight_files import WEIGHTS, adapter_alone
@@ -95,6 +97,7 @@ def read_source(path: str, label: str | None = None, own_pictures: bool = False)
     if kind == REPLAY and colon:
         return PolicySource(label or REPLAY, path, REPLAY, fingerprint=stored_fingerprint(Path(file)))
     # `checkpoints/last` is another folder after the next save: what is loaded later is what is described here.
+    check_name(path)
     folder = find_pretrained(Path(path)).resolve()
     try:
         config = json.loads((folder / "config.json").read_text(encoding="utf-8"))
@@ -113,6 +116,23 @@ def read_source(path: str, label: str | None = None, own_pictures: bool = False)
         origin.experiment,
         has_queues(config),
     )
+
+
+def check_name(path: str) -> None:
+    """Check what can be told of `path` before anything is there: a checkpoint may be made in the meantime.
+
+    Raises:
+        UnknownNameError: a misspelt reference policy, or an address of a protocol that is not spoken.
+        UserError: an address without a host, or with a port that is none.
+    """
+    if is_address(path):
+        parse_address(path)
+        return
+    kind, colon, _ = path.partition(":")
+    known = (REPLAY,) if colon else REFERENCE_POLICIES
+    close = difflib.get_close_matches(kind.lower(), known, n=1, cutoff=0.6)
+    if kind not in known and close and "/" not in path and not Path(path).exists():
+        raise UnknownNameError("policy", path, [f"{name}:FILE" if colon else name for name in known])
 
 
 def default_label(origin: Origin, folder: Path) -> str:

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.evaluation.actors.checkpoint import check_name
 from robocasa_lerobot.evaluation.config.evaluation import EvaluationConfig, PolicySettings, check_factory
 from robocasa_lerobot.evaluation.config.loader import load_config
 from robocasa_lerobot.evaluation.planning.run_header import (
@@ -77,6 +78,8 @@ def planned(config: EvaluationConfig) -> PlannedTasks:
         NothingRegisteredError: this version has none of them.
         UserError: something is named that does not exist.
     """
+    for path in config.policy.path:
+        check_name(path)
     check_factory(config.env.factory)
     tasks = plan_tasks(config.env, config.first_sets)
     for phase in config.policy.lifelong_phase if config.lifelong else ():
