@@ -39,8 +39,6 @@ this page.
 - Being inside ({inside} tasks): the published tolerance is 0.05 over the length of the region's edge, so that the
   shorter the edge, the farther an object may stand out, half a metre in drawers; here it is {margin} m everywhere, and
   the object's own origin is inside.
-- The start ({beside} tasks): the robot stands in line with the object that it starts at, up to 15 cm aside, the
-  original's with the middle of the region in which that was drawn.
 - Contacts of objects: `solref` is 0.004 s, two steps of the physics, where the original has 0.001; objects start 4 mm
   above what they stand on and settle before the episode, 10 mm in the original.
 
@@ -99,7 +97,6 @@ def _in_many() -> dict[str, object]:
         "of": sum(not category.added for category in CATEGORIES.values()),
         "inside": sum(asks_inside(goal_of(task)) for task in tasks),
         "margin": INSIDE_MARGIN_M,
-        "beside": sum(bool(task.robot_start.at_object) for task in tasks),
     }
 
 

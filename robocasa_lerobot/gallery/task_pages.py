@@ -148,7 +148,7 @@ def _choice(choice: Choice) -> str:
 def _start(start: RobotStart) -> str:
     said = f"{'beside' if start.beside else 'in front of'} `{start.fixture}`"
     if start.at_object:
-        said += f", in line with `{start.at_object}`"
+        said += f", in line with the region of `{start.at_object}`"
     return said + (f", {start.setback:g} m farther back" if start.setback else "")
 
 

@@ -17,7 +17,7 @@ from robocasa_lerobot.envs.kitchens.footprints import PlacementError
 from robocasa_lerobot.envs.kitchens.layout import Layout, load_layout
 from robocasa_lerobot.envs.kitchens.splits import scene_ids
 from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
-from robocasa_lerobot.envs.scene.build import build_scene
+from robocasa_lerobot.envs.scene.build import arrange, build_scene
 from robocasa_lerobot.envs.scene.robot_poses import Obstacles, RobotPose, robot_pose
 from robocasa_lerobot.envs.scene.roles import candidates, counter_of
 from robocasa_lerobot.envs.scene.spec import RobotStart
@@ -62,6 +62,28 @@ def test_poses_spread_uniformly_about_the_place_in_front_of_the_fixture() -> Non
     # To both sides and both nearer and farther; the standard deviation of a uniform number is its half range / sqrt 3.
     np.testing.assert_allclose(spread.mean(axis=0), 0.0, atol=0.02)
     np.testing.assert_allclose(spread.std(axis=0), np.array(DEVIATION_M) / np.sqrt(3), rtol=0.1)
+
+
+def test_in_front_of_an_object_is_in_front_of_the_region_where_it_was_drawn() -> None:
+    """Of a wide one, so that the object itself may be far aside; and of what lies in a bowl, the bowl's region."""
+    aside, off = [], []
+    for name in ("BreadSetupSlicing", "AddIceCubes"):
+        task = get_task(name)
+        task = replace(task, robot_start=replace(task.robot_start, deviation=(0.0, 0.0)))
+        for seed, layout_id in enumerate((11, 21, 31, 41, 51)):
+            try:
+                found = arrange(np.random.default_rng(seed), task, "pretrain", load_layout(layout_id, layout_id))
+            except PlacementError:
+                continue
+            placed, pose = found.objects[task.robot_start.at_object], found.robot_pose
+            side = np.array([-np.sin(pose.yaw), np.cos(pose.yaw)])
+            aside.append(abs(float(side @ (np.array(placed.region_middle) - (pose.x, pose.y)))))
+            off.append(abs(float(side @ (np.array(placed.pos[:2]) - placed.region_middle))))
+            inside = {one.region_middle for key, one in found.objects.items() if key.startswith("ice_cube")}
+            assert inside == ({placed.region_middle} if name == "AddIceCubes" else set())
+    assert len(aside) >= 7
+    assert sorted(aside)[len(aside) // 2] == pytest.approx(0, abs=1e-9)  # where there was room
+    assert max(off) > 0.3
 
 
 def test_blocked_poses_are_drawn_again_and_the_deviation_widens(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -222,7 +222,7 @@ def arrange(
     places |= _shares(initial, roles, choices)
     objects = place_objects(rng, task, split, layout, roles, places, choices.values, open_doors_of(opened))
     if pose is None:
-        at = objects[start.at_object].pos[:2]
+        at = objects[start.at_object].region_middle
         pose = robot_pose(rng, layout, start, layout.fixtures[roles[start.fixture]], shape, at, opened)
     return Arrangement(roles, choices, openness, initial, lids, objects, pose)
 

@@ -18,12 +18,15 @@ class PlacedObject:
 
     One that is `lying` was turned by a quarter about its own x axis before.
     `let_down_m` is how far above the floor of a vessel it starts: it may come down by that while it settles.
+    `region_middle` is that of the rectangle in which its place was drawn, in the room, metres; of what lies in a vessel
+    the vessel's.
     """
 
     name: str
     item: Instance
     pos: tuple[float, float, float]
     yaw: float
+    region_middle: tuple[float, float]
     lying: bool = False
     let_down_m: float = 0.0
 

@@ -233,7 +233,8 @@ class RobotStart:
         clearance: beside it, metres.
         deviation: half ranges of the uniform noise along and towards the counter, metres.
         setback: farther from it than usual, metres.
-        at_object: name of an object that it stands in line with, instead of the fixture's middle.
+        at_object: name of an object; it stands in line with the middle of the region in which that is placed, instead
+            of the fixture's.
     """
 
     fixture: str

@@ -227,7 +227,7 @@ def _put_down(
             )
     table.taken.append((footprint, area.z))
     z = area.z + height / 2 + PLACEMENT_GAP_M
-    table.placed[name] = PlacedObject(name, item, (footprint.x, footprint.y, z), footprint.yaw, lying)
+    table.placed[name] = PlacedObject(name, item, (footprint.x, footprint.y, z), footprint.yaw, area.middle, lying)
     return next(number for number, one in enumerate(areas) if one is area)
 
 
@@ -273,7 +273,7 @@ def _put_on(
         footprint, lowest = _let_down(table, footprint, area, holder, rim, height)
         top = max(top, lowest)
         at = (footprint.x, footprint.y, top + height / 2 + PLACEMENT_GAP_M)
-        table.placed[name] = PlacedObject(name, item, at, footprint.yaw, let_down_m=top - floor)
+        table.placed[name] = PlacedObject(name, item, at, footprint.yaw, holder.region_middle, let_down_m=top - floor)
         return
     others = [
         p.footprint
@@ -283,7 +283,7 @@ def _put_on(
     footprint, _ = place(rng, [area], (width / 2, depth / 2), others, margin=0.002, what=what)
     footprint, lowest = _let_down(table, footprint, area, holder, rim, height)
     at = (footprint.x, footprint.y, lowest + height / 2 + PLACEMENT_GAP_M)
-    table.placed[name] = PlacedObject(name, item, at, footprint.yaw, let_down_m=lowest - floor)
+    table.placed[name] = PlacedObject(name, item, at, footprint.yaw, holder.region_middle, let_down_m=lowest - floor)
     table.taken.append((footprint, lowest))
 
 
