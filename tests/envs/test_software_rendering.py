@@ -19,6 +19,7 @@ from robocasa_lerobot.demos.demonstrator import demonstrate
 from robocasa_lerobot.demos.planning.errors import SkillError
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.rendering import SceneRenderer
+from robocasa_lerobot.envs.rendering.software import painter as painter_module
 from robocasa_lerobot.envs.rendering.software.arrays import View
 from robocasa_lerobot.envs.rendering.software.rasterization import NOTHING, visible
 from robocasa_lerobot.errors import UnknownNameError
@@ -308,3 +309,33 @@ def test_a_picture_does_not_depend_on_what_is_kept(task: str) -> None:
         assert all(np.array_equal(*pair) for pair in zip(*again, strict=True))
         assert all(np.array_equal(*pair) for pair in zip(again[0], before[number], strict=True))
     env.close()
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_pictures_are_right_after_an_interrupt(monkeypatch: pytest.MonkeyPatch, threads: int) -> None:
+    """Ctrl-C while a view is drawn to be kept, as in a notebook or a teleoperation that goes on afterwards."""
+    model = mujoco.MjModel.from_xml_string(scene(FLOOR, *THINGS))
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    renderer = SceneRenderer(model, 48, 48, opengl=False)
+    monkeypatch.setattr(painter_module, "_threads_at_most", lambda: threads)
+    monkeypatch.setattr(painter_module, "_threads", {})
+    first = renderer.render(data, "seen")
+    really, interrupted = painter_module.draw, []
+
+    def draw(*arguments: object) -> None:
+        if painter_module.KEEP in [one for one in arguments if isinstance(one, int)]:
+            interrupted.append(True)
+            raise KeyboardInterrupt
+        really(*arguments)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(painter_module, "draw", draw)
+        with pytest.raises(KeyboardInterrupt):
+            renderer.render(data, "seen")
+    assert interrupted
+    for _ in range(3):
+        np.testing.assert_array_equal(renderer.render(data, "seen"), first)
+    for pool in painter_module._threads.values():
+        pool.shutdown()
+    renderer.close()

@@ -34,7 +34,7 @@ from robocasa_lerobot.envs.rendering.software.arrays import (
 )
 from robocasa_lerobot.envs.rendering.software.drawing import KEEP, KEEP_NOTHING, USE_KEPT, draw
 from robocasa_lerobot.envs.rendering.software.rasterization import nearest_m
-from robocasa_lerobot.envs.rendering.standing_views import StandingViews
+from robocasa_lerobot.envs.rendering.standing_views import Key, StandingViews
 from robocasa_lerobot.gl import note_own_renderer
 from robocasa_lerobot.jobs.workers import cores_here
 
@@ -91,34 +91,41 @@ class Painter:
         poses = [self._pose(data, camera, looks) for camera in cameras]
         if self._keeps_views:
             self._standing.note(np.column_stack((data.geom_xpos, data.geom_xmat, looks)))
-        chosen = [self._kept(camera, pose) for camera, pose in zip(cameras, poses, strict=True)]
+        keys = [_view_key(camera, pose) for camera, pose in zip(cameras, poses, strict=True)]
+        chosen = [self._kept(key) for key in keys]
         work: deque[_Work] = deque(
             (pose, View(first, end, width), *keeping, picture)
             for first, end in reversed(rows)  # the lower ones first: they show more, and take longer
             for pose, keeping, picture in zip(poses, chosen, pictures, strict=True)
         )
         count = min(threads, len(work))
-        while len(self._scratch) < count:
-            self._scratch.append(Scratch.of(len(self._shapes.vertices), height, width))
-        # Compiled code leaves Python's lock alone: this thread draws what the others have not begun.
-        others = [_pool().submit(self._draw, work, scratch) for scratch in self._scratch[1:count]]
-        self._draw(work, self._scratch[0])
-        for other in others:
-            other.result()
+        # Memory to draw in is ours again once all is drawn: after an interrupt, other threads may still write to it.
+        scratches, self._scratch = self._scratch, []
+        while len(scratches) < count:
+            scratches.append(Scratch.of(len(self._shapes.vertices), height, width))
+        try:
+            # Compiled code leaves Python's lock alone: this thread draws what the others have not begun.
+            others = [_pool().submit(self._draw, work, scratch) for scratch in scratches[1:count]]
+            self._draw(work, scratches[0])
+            for other in others:
+                other.result()
+        finally:
+            work.clear()  # nobody waits any more for what an interrupt has left
+        self._scratch = scratches
+        for key, (keeping, kept) in zip(keys, chosen, strict=True):
+            if keeping == KEEP:  # not before it is drawn: what an interrupt cut short is no view
+                self._standing.keep(key, kept, kept.is_in)
         return pictures
 
-    def _kept(self, camera: int, pose: Pose) -> tuple[int, Kept]:
+    def _kept(self, key: Key) -> tuple[int, Kept]:
         """How a picture is drawn: `draw`'s `keeping` and `kept`."""
         if not self._keeps_views:
             return KEEP_NOTHING, self._nothing
-        key = (camera, b"".join(part.tobytes() for part in (pose.eye, pose.axes, pose.lens, pose.lights)))
         if (found := self._standing.find(key)) is not None:
             return USE_KEPT, found[0]
         if not self._standing.comes_again(key):
             return KEEP_NOTHING, self._nothing
-        made = Kept.of(self._standing.still, *self._size)
-        self._standing.keep(key, made, made.is_in)
-        return KEEP, made
+        return KEEP, Kept.of(self._standing.still, *self._size)
 
     def _draw(self, work: deque[_Work], scratch: Scratch) -> None:
         """Draw what is left to do."""
@@ -178,6 +185,11 @@ class Painter:
         rows[:, EXPONENT] = model.light_exponent[shining]
         rows[:, IS_FAR] = model.light_type[shining] == _DIRECTIONAL
         return lights
+
+
+def _view_key(camera: int, pose: Pose) -> Key:
+    """What tells a view from another: its camera, and from where and in what light it sees."""
+    return camera, b"".join(part.tobytes() for part in (pose.eye, pose.axes, pose.lens, pose.lights))
 
 
 @cache
