@@ -4,8 +4,8 @@ The seeds are those of the result that is there, or from 610,000 on, in both spl
 Every trial is a line of `outputs/demonstrators.jsonl`, so that a run can be stopped and continued; the result holds
 all trials that are there.
 They are kept beside it (`.trials.gz`), where a checkout without such a file begins. A trial says which declaration and
-which code of skills it was made with: the same command makes those again for which that has changed, and no others.
-`--fresh` makes all of them again:
+which code of skills it was made with: the same command makes those again for which that has changed, and no others,
+and a result is not replaced by one of fewer trials because of them. `--fresh` makes all of them again:
 
     python benchmarks/demonstrators.py --tasks OpenDrawer,CloseDrawer --fresh
 
@@ -186,6 +186,11 @@ def others_there(out: Path, settings: Mapping[str, Any]) -> str:
     return differing(json.loads(out.read_text(encoding="utf-8"))["settings"], settings) if out.is_file() else ""
 
 
+def trials_there(out: Path) -> int:
+    """How many trials a result that is there counts; 0 where there is none."""
+    return int(json.loads(out.read_text(encoding="utf-8")).get("trials", 0)) if out.is_file() else 0
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run what is missing, print, write."""
     options = parse(arguments)
@@ -218,6 +223,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     trials = [trial for trial in found if is_current(trial)]
     if len(trials) < len(found):
         print(f"{len(found) - len(trials)} trials were made with other skills or declarations, and do not count")
+        if len(trials) < (counted := trials_there(options.out)):  # nothing of what is committed is emptied
+            print(
+                f"demonstrators: {options.out} has {counted} trials, of which {len(trials)} would be left. It stays as "
+                "it is. Give the same without --report for all of its tasks, which makes the others again, or "
+                "--out outputs/mine.json.",
+                file=sys.stderr,
+            )
+            return 2
     tasks = summary(trials, {name: can_demonstrate(get_task(name)) for name in task_names()})
     body = {
         "machine": common.machine(),

@@ -185,6 +185,31 @@ def test_trials_are_made_again_where_their_skills_or_declaration_changed(
     sources.sources_of.cache_clear()
 
 
+@pytest.mark.parametrize("words", [["--report"], []])
+def test_a_result_is_not_emptied_of_trials_that_count_no_more(
+    bench: ModuleType,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    words: list[str],
+) -> None:
+    trials = [_trial(bench, "OpenDrawer", "target", seed, True) for seed in (7, 8)]
+    file, out = tmp_path / "trials.jsonl", tmp_path / "result.json"
+    file.write_text(bench._lines(trials))
+    monkeypatch.setattr(bench, "draw", lambda *_: None)
+    monkeypatch.setattr(bench, "run", lambda *_: None)  # killed before the first has ended
+    options = ["--tasks=OpenDrawer", "--first-seed=7", "--splits=target", f"--trials={file}", f"--out={out}"]
+    assert bench.main(["--report", *options]) == 0
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    monkeypatch.setattr(bench, "is_current", lambda trial: trial.seed == 8)
+    assert bench.main([*words, *options]) == 2
+    assert "has 2 trials, of which 1 would be left" in capsys.readouterr().err
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+    out.unlink()  # where none is there, those that count are a result
+    assert bench.main([*words, *options]) == 0
+    assert json.loads(out.read_text())["trials"] == 1
+
+
 def test_whatever_goes_wrong_is_a_failed_trial(bench: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
     def hangs(*_: Any, **__: Any) -> None:
         time.sleep(5.0)
