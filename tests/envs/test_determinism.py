@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import ast
 import hashlib
+import re
 import subprocess
 import sys
 from contextlib import closing
@@ -12,6 +14,7 @@ import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
+from source_tree import PACKAGE
 from task_selection import demonstrated, sample
 
 from robocasa_lerobot.demos.demonstrator import demonstrate
@@ -137,3 +140,18 @@ def test_a_thousand_resets_and_twenty_thousand_steps_leave_memory_flat() -> None
     # The first hundred fill caches; from then on the second half may not lie above the first.
     growth = np.mean(resident[-3:]) - np.mean(resident[1:4])
     assert growth < 20, f"grew by {growth:.0f} MiB: {resident}"
+
+
+def test_no_two_streams_of_a_seed_are_the_same() -> None:
+    """What is drawn for one purpose says nothing of what is drawn for another: each has a number of its own."""
+    found: list[tuple[int, str, str]] = []
+    apart = PACKAGE / "evaluation/planning/trials.py"  # whose seeds are an evaluation's
+    for path in sorted(set(PACKAGE.rglob("*.py")) - {apart}):
+        for line in re.findall(r"^\w*_STREAM\b.*=.*$", path.read_text(encoding="utf-8"), re.MULTILINE):
+            names, _, values = line.partition("=")
+            numbers = ast.literal_eval(values.partition("#")[0].strip())
+            numbers = numbers if isinstance(numbers, tuple) else (numbers,)
+            found += [(number, name.strip(), path.name) for number, name in zip(numbers, names.split(","), strict=True)]
+    assert {"_CAMERA_NOISE_STREAM", "_NOISE_STREAM", "_ARM_NOISE_STREAM"} <= {name for _, name, _ in found}
+    shared = [one for one in found if sum(one[0] == other[0] for other in found) > 1]
+    assert not shared, "take the next free number"

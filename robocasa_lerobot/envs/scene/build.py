@@ -40,7 +40,7 @@ RENDER_PRESETS = ("fast", "quality")
 MAX_ATTEMPTS = 50
 FEW_KITCHENS = 5  # in so few, 50 attempts have met each about ten times
 # Key of the generator of camera noise: a stream of its own, so that noise changes nothing else of the scene.
-_CAMERA_NOISE_STREAM = 2
+_CAMERA_NOISE_STREAM = 5
 
 # Liquids in a vessel: colour and opacity.
 LIQUIDS = {
