@@ -41,7 +41,8 @@ class MotionStyle:
     """How a demonstration is carried out. The defaults change nothing.
 
     Attributes:
-        speed: bound of the arm's commands, and factor of the driving base's speed, in (0, 1].
+        speed: bound of the commands that move the hand, not of those that turn it, and factor of the driving base's
+            speed, in (0, 1].
         bow_rad: angle about the vertical by which free horizontal paths of the open hand start beside their goal.
         hand: quaternion (w, x, y, z) in the world of the hand that is preferred.
         weight: what the preference is worth, in the cost of candidates.

@@ -13,11 +13,15 @@ from idle_demonstration import write_idle
 
 from robocasa_lerobot import cli, contract
 from robocasa_lerobot.demos.hdf5 import Failure, read_summary, segments_of
-from robocasa_lerobot.demos.quality.measure import Measures, Start, _idle, _jerk, _saturated
+from robocasa_lerobot.demos.quality.measure import FULL, Measures, Start, _idle, _jerk, _saturated, _speed
 from robocasa_lerobot.demos.quality.summary import BIN_M, Quality
+from robocasa_lerobot.demos.recorder import record_episode
 from robocasa_lerobot.demos.recording import RecordingSettings, record_tasks
+from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.evaluation.inventory import worth
+
+ARM = ("position", "rotation")
 
 
 def one(seed: int, ahead: float, *, path: float = 0.0, sources: tuple[int, ...] = ()) -> Measures:
@@ -71,6 +75,25 @@ def test_motion() -> None:
     assert _saturated(actions) == 0.25
 
 
+def test_commands_of_a_varied_demonstration_are_at_the_bound_of_its_style() -> None:
+    """Its free paths go as fast as its style lets them, of which none is a full command; its turns may be full."""
+    env = KitchenEnv("OpenDrawer", cameras=(), terminate_on_success=False)
+    try:
+        recording = record_episode(env, 3, varied=True)
+    finally:
+        env.close()
+    speed = recording.ep_meta["motion_style"]["speed"]
+    actions = contract.hdf5_to_stored(recording.actions)
+    position, rotation = (np.abs(actions[:, contract.ACTION_SLICES[f"end_effector_{what}"]]) for what in ARM)
+    assert position.max() == pytest.approx(speed)
+    assert speed < FULL
+    bound = np.isclose(position, speed).any(axis=1)
+    assert bound.mean() > 0.1
+    assert _saturated(actions, _speed(recording.ep_meta)) >= bound.mean()
+    assert _saturated(actions) == (rotation > FULL).any(axis=1).mean()
+    assert (_speed({}), _speed({"motion_style": None})) == (1.0, 1.0)
+
+
 def test_drives_to_objects_and_kitchens_that_cannot_be_made(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     nowhere = Failure(-5, "ValueError: expected non-negative integer", segments=(("part drawer.box", "a"),))
     path = write_idle(tmp_path / "AlignSilverware.hdf5", [nowhere])
@@ -107,5 +130,6 @@ def test_the_command_measures_files(tmp_path: Path, capsys: pytest.CaptureFixtur
     found = json.loads(capsys.readouterr().out)[str(tmp_path)][0]
     assert (found["task"], found["kept"], found["rate"], found["covered"]) == ("CloseDrawer", 2, 1.0, 1.0)
     assert 0.0 < found["in_view"] <= 1.0
+    assert found["saturated"] > 0.1, "each has a style, by whose speed its commands are bound"
     assert 0.0 <= found["other_contacts"] < 0.5
     assert found["path_spread_m"] > 0.01

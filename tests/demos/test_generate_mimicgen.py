@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -48,6 +48,7 @@ from robocasa_lerobot.demos.generate.sources.segments import cut, signals_of
 from robocasa_lerobot.demos.generate.sources.source import sources_of
 from robocasa_lerobot.demos.generate.sources.transform import inverse, yaw_pose
 from robocasa_lerobot.demos.motion import Array, hand_rotation
+from robocasa_lerobot.demos.motion_style import PLAIN
 from robocasa_lerobot.demos.recording import RecordingSettings, record_tasks
 from robocasa_lerobot.demos.replay import replay
 from robocasa_lerobot.demos.skills.common import SkillError
@@ -355,6 +356,8 @@ def test_a_templates_noise_has_clean_labels_beside_it(tmp_path: Path) -> None:
     noisy = (labels >= 0) & (np.arange(len(labels)) < GRASP)
     assert away[noisy].min() > 1e-4
     assert away[labels < 0].max() < 1e-6  # lines between subtasks have none
+    assert recording.ep_meta["motion_style"] == asdict(PLAIN), "the settings vary, but no subtask asks for a style"
+    assert (recording.ep_meta["action_noise"], recording.ep_meta["subtask_noise"]) == (0.05, [0.05, 0.0])
 
 
 def test_weights_of_a_template_count() -> None:

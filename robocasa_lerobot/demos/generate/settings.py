@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -36,6 +36,7 @@ from robocasa_lerobot.demos.generate.sources.source import (
 )
 from robocasa_lerobot.demos.generate.stage import generated
 from robocasa_lerobot.demos.hdf5 import segments_of
+from robocasa_lerobot.demos.motion_style import PLAIN
 from robocasa_lerobot.demos.recorder import Recording
 from robocasa_lerobot.demos.replay import Demonstration
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
@@ -198,18 +199,26 @@ class GenerationSettings(RecordingSettings):
         if self.method == MIMICGEN:
             subtasks = self.subtasks()
             noisy = any(one.action_noise > 0.0 for one in subtasks.template.subtasks)
-            return self.labelled_episode(
+            recording = self.labelled_episode(
                 env,
                 seed,
                 lambda env, style, log: course.counted(plain_episode(env, log, subtasks, course)),
                 clean=course.clean if noisy else None,
             )
+            recording.ep_meta["motion_style"] = asdict(PLAIN)  # subtasks are carried over as they are
+            if noisy:  # beside the noise that comes to every action
+                of_subtasks = [one.action_noise for one in subtasks.template.subtasks]
+                recording.ep_meta["action_noise"] = float(np.hypot(self.action_noise, max(of_subtasks)))
+                recording.ep_meta["subtask_noise"] = of_subtasks
+            return recording
         if self.method == REPLAY:
             number, name, source = self._replayed_in_turn(seed)
             course.used.append(segment_of(name, number, source))
-            return self.labelled_episode(
+            recording = self.labelled_episode(
                 env, source.seed, lambda env, _, log: course.counted(replayed(env, log, source, number, course)), seed
             )
+            recording.ep_meta["motion_style"] = source.meta.get("motion_style", asdict(PLAIN))  # as its actions have it
+            return recording
         return self.labelled_episode(env, seed, lambda env, style, log: generated(env, style, log, course))
 
     def _replayed_in_turn(self, seed: int) -> tuple[int, str, Demonstration]:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import h5py
 import mujoco
@@ -27,7 +28,7 @@ from robocasa_lerobot.errors import UserError
 EVERY = 4  # steps between states that are looked at for contacts and views
 PATH_POINTS = 20  # of a path that is compared with others
 STILL_M = 0.002  # of the hand in a step: it idles
-FULL = 0.98  # of a command: it is saturated
+FULL = 0.98  # of a command's bound: it is saturated
 FREE_DOFS = 6
 
 
@@ -49,7 +50,8 @@ class Measures:
         seconds: that it takes.
         jerk: root mean square of the hand's third derivative, m/s^3.
         idle: share of steps in which the hand does not move, though the base does not either.
-        saturated: share of steps in which a component of the arm's command is at its bound.
+        saturated: share of steps in which a component of the arm's command is at its bound, which of positions is the
+            speed of the demonstration's style.
         other_contacts: share of the states looked at in which the robot touches what no stage is about.
         in_view: share of these in which a camera has the running stage's object or fixture in its picture.
         path: (PATH_POINTS, 3) of the hand, evenly in time, in the frame of `start`'s thing: metres, and axes of the
@@ -129,7 +131,7 @@ def _measured(env: KitchenEnv, recorded: Demonstration, sources: tuple[int, ...]
         seconds=len(recorded.actions) / contract.CONTROL_HZ,
         jerk=_jerk(hands),
         idle=_idle(hands, bases),
-        saturated=_saturated(recorded.actions),
+        saturated=_saturated(recorded.actions, _speed(recorded.meta)),
         other_contacts=float(np.mean(touches)),
         in_view=float(np.mean(views)),
         path=path,
@@ -150,9 +152,16 @@ def _idle(hands: Array, bases: Array) -> float:
     return float(((moved < STILL_M) & (driven < STILL_M)).mean()) if len(moved) else 0.0
 
 
-def _saturated(actions: Array) -> float:
-    arm = np.hstack([actions[:, contract.ACTION_SLICES[f"end_effector_{what}"]] for what in ("position", "rotation")])
-    return float((np.abs(arm) > FULL).any(axis=1).mean())
+def _speed(meta: dict[str, Any]) -> float:
+    """Bound of a demonstration's commands to move the hand, see `MotionStyle`; rotations are not bound by it."""
+    return float((meta.get("motion_style") or {}).get("speed", 1.0))
+
+
+def _saturated(actions: Array, speed: float = 1.0) -> float:
+    position, rotation = (
+        np.abs(actions[:, contract.ACTION_SLICES[f"end_effector_{what}"]]) for what in ("position", "rotation")
+    )
+    return float(((position > FULL * speed).any(axis=1) | (rotation > FULL).any(axis=1)).mean())
 
 
 def _about(env: KitchenEnv, data: mujoco.MjData, stage: Stage) -> Array:
