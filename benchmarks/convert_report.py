@@ -12,6 +12,7 @@ ROWS: dict[str, str] = {
     "images_ours_1": "ours, 1 worker",
     "images_ours_2": "ours, 2 workers",
     "images_lerobot": "LeRobot, default settings",
+    "images_lerobot_alike": "LeRobot, our codec, pictures straight to the encoder",
     "images_encoder_1": "encoder alone, 1 process",
     "images_encoder_2": "encoder alone, 2 processes",
     "states_ours_1": "ours, 1 worker",
@@ -44,6 +45,7 @@ RATIOS: dict[str, tuple[str, str, float | None]] = {
     "images_of_encoder_2": ("images_ours_2", "images_encoder_2", 0.8),
     "images_vs_lerobot": ("images_ours_1", "images_lerobot", 5.0),
     "images_vs_lerobot_2": ("images_ours_2", "images_lerobot", 5.0),
+    "images_vs_lerobot_alike": ("images_ours_1", "images_lerobot_alike", None),
     "states_of_renderer": ("states_ours_1", "states_renderer_1", 0.9),
     "states_of_renderer_2": ("states_ours_2", "states_renderer_2", 0.9),
     "states_of_scenes": ("states_ours_1", "states_scenes_1", None),
@@ -114,7 +116,7 @@ def _commands(body: dict[str, Any]) -> str:
     rows = [
         [f"{key.rpartition('_')[0]}, {key.rpartition('_')[2]} process(es)", f"{run['seconds']:.1f}",
          f"{run['frames'] / run['seconds']:.1f}", f"{run['peak_mib']:.0f}", str(run["processes"])]
-        for key, run in body["commands"].items()
+        for key, run in body.get("commands", {}).items()
     ]  # fmt: skip
     header = ["the whole command, imports included", "s", "steps/s", "peak MiB", "processes"]
     return common.table(header, rows) if rows else ""
@@ -129,11 +131,13 @@ def _memory(body: dict[str, Any]) -> str:
 
 
 def _startup(body: dict[str, Any]) -> str:
-    startup = body["startup"]
-    loading = body["scene_loading"]
-    lines = [
+    startup, loading = body.get("startup"), body["scene_loading"]
+    starting = startup and (
         f"Not in the rates: start of a process with its imports {startup['process_s']:.1f} s; start of two workers, "
-        f"once in a conversion with several processes, {startup['two_workers_s']:.1f} s.",
+        f"once in a conversion with several processes, {startup['two_workers_s']:.1f} s."
+    )
+    lines = [
+        *([starting] if starting else []),
         f"In ours, not in the renderer's: opening the scenes, {1000 * loading['seconds_per_demo']:.0f} ms a demo, "
         f"{100 * loading['share_of_drawing']:.1f} % of the drawing.",
     ]

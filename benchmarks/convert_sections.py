@@ -34,11 +34,15 @@ def chosen_sections(only: str | None, output: Path) -> tuple[str, ...]:
 
 
 def merged(before: dict[str, Any], body: dict[str, Any], sections: Sequence[str]) -> dict[str, Any]:
-    """An earlier result with the figures of some sections replaced; `measured_again` says when and at which commit.
+    """An earlier result with the figures of some sections replaced; `measured_again` says when, where and of what.
 
-    Ratios compare within a section only, so both sides of each are of one run.
+    Ratios compare within a section only, so both sides of each are of one run. `machine` and `versions` of the result
+    stay those of everything else. Whole commands and starts go with the rates that they stand beside: those of an
+    earlier run, which may be another machine's, would be read as these ones'.
     """
     found = {key: value for key, value in before.items() if key not in ("benchmark", "date")}
+    if {"images", "states"} & set(sections):
+        found = {key: value for key, value in found.items() if key not in ("commands", "startup")}
     for name in ("frames_per_second", "cpu_ms_per_step", "dataset_mib"):
         kept = {key: value for key, value in before[name].items() if key.partition("_")[0] not in sections}
         both = kept | body[name]
@@ -50,7 +54,8 @@ def merged(before: dict[str, Any], body: dict[str, Any], sections: Sequence[str]
     found["ratios"] = convert_report.ratios(found["frames_per_second"], found["memory"])
     again = {
         "date": utc_now(),
-        "commit": body["versions"]["commit"],
+        "machine": body["machine"],
+        "versions": body["versions"],
         "mode": body["mode"],
         "others_share_of_cores": body["others_share_of_cores"],
     }

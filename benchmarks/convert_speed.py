@@ -164,6 +164,7 @@ def _parts(peer: bool) -> list[Part]:
         if peer:
             parts.append(Part(f"lift_ours_{n}", partial(_lift_ours, key=f"lift_ours_{n}", processes=n)))
     parts.append(Part("images_lerobot", partial(_lerobot, kind="images"), slow=True))
+    parts.append(Part("images_lerobot_alike", partial(_lerobot, kind="images", alike=True), slow=True))
     parts.append(Part("states_lerobot", partial(_lerobot, kind="states"), slow=True))
     parts.append(Part("decode_ours", partial(_decode, ours=True)))
     parts.append(Part("decode_lerobot", partial(_decode, ours=False)))
@@ -223,15 +224,16 @@ def _ours(run: Run, kind: str, processes: int, size: int | None = None) -> float
     return _rate(run, key, answer)
 
 
-def _lerobot(run: Run, kind: str) -> float:
+def _lerobot(run: Run, kind: str, alike: bool = False) -> float:
     file = run.files.images if kind == "images" else run.files.states
-    key = f"{kind}_lerobot"
+    key = f"{kind}_lerobot{'_alike' if alike else ''}"
     answer = run.workers[0].ask(
         "record_with_lerobot",
         file=str(file),
         reference=run.place("reference"),
         out=run.place(key),
         render=kind == "states",
+        alike=alike,
     )
     return _rate(run, key, answer)
 

@@ -82,9 +82,11 @@ def convert(
     return {**taken, "frames": result.num_frames, "mib": folder_mib(Path(out))}
 
 
-def record_with_lerobot(file: str, reference: str, out: str, render: bool) -> dict[str, Any]:
+def record_with_lerobot(file: str, reference: str, out: str, render: bool, alike: bool = False) -> dict[str, Any]:
     """LeRobot's `add_frame` / `save_episode` with its default settings; one process, as it is.
 
+    With `alike` the codec and its options are those of `reference`, and pictures go to the encoder instead of to PNG
+    files: what LeRobot's writer can do at best. Its queue takes a whole episode, since it drops what finds it full.
     Pictures come from the file, or are rendered state by state before they are handed over. Columns other than
     pictures, their names and the instructions are those of `reference`, a conversion of the same demos by us.
     """
@@ -93,9 +95,16 @@ def record_with_lerobot(file: str, reference: str, out: str, render: bool) -> di
     fps = json.loads((Path(reference) / "meta" / "info.json").read_text())["fps"]
     cameras = [key.removeprefix(contract.IMAGE_PREFIX) for key, f in features.items() if f["dtype"] == "video"]
     clock = Clock()
-    dataset = lerobot_dataset.LeRobotDataset.create("local/lerobot", fps, features, root=out, use_videos=True)
     row, rendering = 0, 0.0
     with h5py.File(file, "r") as source:
+        how: dict[str, Any] = {}
+        if alike:
+            longest = max(len(source["data"][name]["actions"]) for name in _demo_names(source))
+            how = {"rgb_encoder": _video_of(Path(reference)), "encoder_threads": ENCODER_THREADS}
+            how |= {"streaming_encoding": True, "encoder_queue_maxsize": longest}
+        dataset = lerobot_dataset.LeRobotDataset.create(
+            "local/lerobot", fps, features, root=out, use_videos=True, **how
+        )
         for name in _demo_names(source):
             scene = RecordedScene(source, name) if render else None
             group = source["data"][name]
@@ -125,8 +134,7 @@ class Encoding:
 
     def load_pictures(self, file: str, demos: list[str], reference: str) -> dict[str, Any]:
         """Read the pictures of demos; codec and options are those of `reference`, a dataset of ours."""
-        record = json.loads((Path(reference) / "meta/robocasa/conversion.json").read_text())
-        self._video = RGBEncoderConfig(**record["video"])
+        self._video = _video_of(Path(reference))
         with h5py.File(file, "r") as source:
             for name in demos:
                 observations = source["data"][name]["obs"]
@@ -278,6 +286,11 @@ def _recorded(root: Path) -> tuple[dict[str, Any], dict[str, NDArray[Any]], list
     }
     names = {int(row.task_index): str(task) for task, row in meta.tasks.iterrows()}
     return features, columns, [names[int(index)] for index in column(root, "task_index")]
+
+
+def _video_of(root: Path) -> RGBEncoderConfig:
+    """Codec and options of a dataset of ours."""
+    return RGBEncoderConfig(**json.loads((root / "meta/robocasa/conversion.json").read_text())["video"])
 
 
 def _demo_names(source: h5py.File) -> list[str]:
