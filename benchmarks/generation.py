@@ -47,7 +47,6 @@ from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.files import write_text
 from robocasa_lerobot.jsonl import read_whole_lines
 from robocasa_lerobot.progress import Bar
-from robocasa_lerobot.provenance import utc_now
 
 FIRST_SEED = 100_500  # development's; sources are from 100,000 on
 FAR_M = 1.5
@@ -250,9 +249,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         "commits": sorted({trial.commit for trial in trials}),
         "machine": common.machine(),
         "versions": common.versions("mujoco", "numpy"),
-        "date": utc_now(),
     }
-    write_text(args.out, json.dumps(body, indent=1) + "\n")
+    common.write_result(args.out, "generation", body)
     picture = args.out.with_suffix(".png")
     draw(body["arms"], picture)
     head = f"`benchmarks/generation.py`, pretraining kitchens, seeds from {args.first_seed} on."

@@ -9,19 +9,16 @@ interval is asked whether it holds the average of the true rates. Good is: never
 from __future__ import annotations
 
 import argparse
-import datetime
-import importlib.metadata
-import json
-import platform
 from collections.abc import Callable
 from pathlib import Path
 
+import common
 import numpy as np
 from numpy.typing import NDArray
 from statsmodels.stats.proportion import proportion_confint
 
 Array = NDArray[np.float64]
-OUT = Path(__file__).parent / "results" / "interval_coverage.json"
+OUT = common.RESULTS / "interval_coverage.json"
 RESAMPLES = 400
 Z = 1.959963984540054
 
@@ -132,11 +129,10 @@ def main() -> None:
         "scenarios": table,
         "repeats": args.repeats,
         "seed": args.seed,
-        "machine": f"{platform.machine()}, {platform.system()}",
-        "versions": {name: importlib.metadata.version(name) for name in ("numpy", "scipy", "statsmodels")},
-        "date": datetime.datetime.now(datetime.UTC).date().isoformat(),
+        "machine": common.machine(),
+        "versions": common.versions("numpy", "scipy", "statsmodels"),
     }
-    args.out.write_text(json.dumps(result, indent=2) + "\n", encoding="utf-8")
+    common.write_result(args.out, "interval_coverage", result)
     print("worst coverage:", worst, "\nmean width beside pooled Wilson:", width)
 
 

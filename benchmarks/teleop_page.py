@@ -110,6 +110,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "seconds": options.seconds,
         "steps": steps,
         "share_running": len(driven) / len(samples),
+        "ratios": {"real_time": figures["real_time"]["median"]},
         "figures": figures,
         "others_busy_share": others,
         "machine": common.machine(),
