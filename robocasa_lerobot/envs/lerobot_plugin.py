@@ -67,10 +67,12 @@ class RobocasaKitchenEnvConfig(EnvConfig):
     """One or more kitchen tasks, each evaluated in vector envs of its own.
 
     `task` is a task name, a task set, or a comma-separated list of them, `image_size` the height and width in pixels,
-    and `episode_length` the time limit in control steps (20 Hz), by default each task's own horizon. `split` is that of
-    the task set where none is given, as with LeRobot's own RoboCasa: `pretrain50` to `pretrain300` are tried in
-    pretraining kitchens, all else in the target kitchens. `render_devices`
-    are the EGL devices (not CUDA's numbers, see `gl`) that parallel kitchens are dealt out to; EGL's choice if None.
+    and `episode_length` the time limit in control steps (20 Hz), by default each task's own horizon. Where no `split`
+    is given, it is that of the task set, as with LeRobot's own RoboCasa: `pretrain50` to `pretrain300` are tried in
+    pretraining kitchens, the other sets in the target kitchens. Tasks by their names, and lists, are tried in the
+    target kitchens too (lists of nothing but pretraining sets in theirs), where LeRobot's RoboCasa takes `all`
+    kitchens: rates of both are to be compared with `split` given. `render_devices` are the EGL devices (not CUDA's
+    numbers, see `gl`) that parallel kitchens are dealt out to; EGL's choice if None.
     """
 
     task: str = "OpenDrawer"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import importlib.metadata
+import inspect
 import json
 import pickle
 import subprocess
@@ -119,6 +120,13 @@ def test_task_sets_have_lerobots_splits(task: str, split: str) -> None:
 
     assert RobocasaKitchenEnvConfig(task=task).gym_kwargs["split"] == _TASK_GROUP_SPLITS.get(task, split) == split
     assert RobocasaKitchenEnvConfig(task=task, split="pretrain_val").gym_kwargs["split"] == "pretrain_val"
+
+
+def test_lerobot_takes_all_kitchens_for_a_task_as_is_said_where_ours_are_the_targets() -> None:
+    from lerobot.envs import robocasa
+
+    assert 'split=self.split if self.split is not None else "all"' in inspect.getsource(robocasa.RoboCasaEnv)
+    assert RobocasaKitchenEnvConfig(task="OpenDrawer").gym_kwargs["split"] == "target"
 
 
 def test_task_sets_stand_for_their_members() -> None:
