@@ -284,6 +284,19 @@ def test_replays_with_noise_repeat_each_source_in_its_own_scene(
     assert cli.main(["verify", str(tmp_path / "data")]) == 0
 
 
+def test_a_replay_has_the_style_of_its_source(tmp_path: Path) -> None:
+    """Whose actions it repeats, whatever style an attempt of its own would have."""
+    record_tasks([RecordingSettings(TASK, 1, varied=False)], tmp_path, show_progress=False)
+    values = {"task": TASK, "episodes": 1, "split": "target", "seed": 100_900, "method": "replay"}
+    settings = GenerationSettings.of(tmp_path, **values, action_noise=0.02)
+    env = settings.make_env()
+    recording = settings.record(env, 100_900)
+    env.close()
+    assert settings.varied
+    assert recording.ep_meta["motion_style"]["speed"] == 1.0
+    assert recording.ep_meta["action_noise"] == 0.02
+
+
 @pytest.mark.slow
 def test_a_composite_task_is_generated_from_sources_of_atomic_ones(tmp_path: Path) -> None:
     known = {"split": "pretrain", "seed": 100_000}
