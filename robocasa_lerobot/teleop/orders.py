@@ -144,6 +144,9 @@ def _stop(session: Session, message: Message, now: float) -> None:
 
 
 def _start(session: Session, message: Message, now: float) -> None:
+    if session.pilot is not None:  # it may be a person's turn still, from before everything was undone
+        session.driver.release()
+        session.pilot.give_back()
     session.run(now)
 
 

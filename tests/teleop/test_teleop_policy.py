@@ -106,6 +106,24 @@ def test_files_of_which_some_say_nothing_convert_without(corrected: Path, tmp_pa
     assert "extra.intervention" not in plan.features
 
 
+@pytest.mark.parametrize("order", ["start", "give_back"])
+def test_a_policy_begins_from_the_start_though_a_person_drove_before_it_was_undone(tmp_path: Path, order: str) -> None:
+    pilot, size = load_pilot("random", TASK)
+    env = KitchenEnv(TASK, split=SPLIT, image_size=size, terminate_on_success=False)
+    with desk(tmp_path, env, pilot=pilot) as table:
+        table.say("start")
+        table.tick(3)
+        table.hold(2, arm=[0, 0, 1, 0, 0, 0])
+        table.say("rewind", steps=100)
+        assert (table.session.phase, pilot.state) == ("ready", "CORRECTING")
+        table.say(order)
+        table.tick(4)
+        origins = table.session.driven.origins
+        assert (pilot.state, [origin.device for origin in origins]) == ("AUTONOMOUS", ["policy"] * 4)
+        assert not any(origin.intervention for origin in origins)
+    env.close()
+
+
 @pytest.mark.slow
 def test_a_checkpoint_acts_as_it_does_elsewhere_and_anew_after_a_correction(tmp_path: Path, checkpoint: Path) -> None:
     pilot, size = load_pilot(str(checkpoint), TASK, "cpu")
