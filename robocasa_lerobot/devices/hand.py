@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from lerobot.teleoperators.keyboard.teleop_keyboard import KeyboardEndEffectorTeleop
 from lerobot.teleoperators.utils import make_teleoperator_from_config
 
 from robocasa_lerobot.devices.config_hand import RobocasaHandConfig
@@ -14,7 +15,7 @@ from robocasa_lerobot.devices.translation import HandTranslator
 class RobocasaHand(KitchenTeleoperator):
     """Reads a gamepad, keyboard or phone through LeRobot and says the kitchen's twelve numbers.
 
-    The base stands and the mode is the arm's: these devices have no more axes. A new episode starts with an open hand.
+    The base stands: these devices have no more axes. A new episode starts with an open hand.
     """
 
     config_class = RobocasaHandConfig
@@ -42,6 +43,8 @@ class RobocasaHand(KitchenTeleoperator):
     def get_action(self) -> dict[str, float]:
         """What the operator does now."""
         said: dict[str, Any] = dict(self.device.get_action())
+        if isinstance(self.device, KeyboardEndEffectorTeleop):
+            _forget_released(self.device)
         if self._phone is not None and said:
             said = self._phone.action(said)
         return self._translator.action(said)
@@ -55,6 +58,14 @@ class RobocasaHand(KitchenTeleoperator):
         """Close the device."""
         super().disconnect()
         self.device.disconnect()
+
+
+def _forget_released(keyboard: KeyboardEndEffectorTeleop) -> None:
+    # LeRobot goes through its keys in the order of their first presses, those that are let go as well, and the last one
+    # of an axis counts: a key that was let go would undo its opposite, and the left Ctrl close the hand for ever.
+    pressed = keyboard.current_pressed
+    for key in [key for key, down in pressed.items() if not down]:
+        del pressed[key]
 
 
 def _phone_step(config: RobocasaHandConfig) -> Any:

@@ -17,7 +17,10 @@ from robocasa_lerobot.envs.robots.panda_omron.control.kernel import POSITION_SCA
 from robocasa_lerobot.errors import UserError
 
 NAMES: tuple[str, ...] = tuple(contract.component_names(contract.ACTION_PARTS))
-OPEN, CLOSED, ARM_MODE = -1.0, 1.0, -1.0
+OPEN, CLOSED = -1.0, 1.0
+# What a motion is added to: the pose that the hand has reached, of which a quarter arrives in a step, or its goal
+# before, so that all of it arrives in the end. Deflections mean a speed and end at once; a phone's pose is a place.
+FROM_REACHED, FROM_GOAL = -1.0, 1.0
 JUMP_M = 0.06  # of a phone from one step to the next: its tracking was lost, the hand stays
 _DELTAS = ("delta_x", "delta_y", "delta_z")
 # LeRobot has a phone's turns for a tool that points down (`EEReferenceAndDelta`): about x and z the other way round.
@@ -57,7 +60,8 @@ class HandTranslator:
         if set(_DELTAS) <= said.keys():
             return self._named(self._from_deltas(said))
         if set(_TARGETS) <= said.keys():
-            return self._named(self._from_pose(said))
+            motion = self._from_pose(said)
+            return self._named(np.zeros(6)) if motion is None else self._named(motion, FROM_GOAL)
         raise UserError(
             f"the teleoperator says {', '.join(sorted(map(str, said))[:8])}; a kitchen understands its own "
             f"twelve numbers ({', '.join(NAMES)}), delta_x, delta_y, delta_z with gripper, or a phone's pose. "
@@ -73,17 +77,18 @@ class HandTranslator:
         self._grip(close=grip < 0.5, open_=grip > 1.5)
         return np.array([x, y, z, 0.0, 0.0, 0.0]) * self._speed
 
-    def _from_pose(self, said: Mapping[str, Any]) -> NDArray[np.float64]:
+    def _from_pose(self, said: Mapping[str, Any]) -> NDArray[np.float64] | None:
+        """The motion since the last pose; None where the hand is to stay where it is, and push no longer."""
         grip = float(said.get("gripper_vel", 0.0))
         self._grip(close=grip < -0.5, open_=grip > 0.5)
         if not said.get("enabled", True):
             self._last = None
-            return np.zeros(6)
+            return None
         values = np.array([float(said[name]) for name in _TARGETS])
         now = values[:3], Rotation.from_rotvec(values[3:] * _TURNS_OF_TOOL)
         last, self._last = self._last, now
         if last is None or np.linalg.norm(now[0] - last[0]) > JUMP_M:
-            return np.zeros(6)
+            return None
         turned = (now[1] * last[1].inv()).as_rotvec()
         motion = np.concatenate([(now[0] - last[0]) / POSITION_SCALE_M, turned / ROTATION_SCALE_RAD])
         return np.asarray(motion * self._speed)
@@ -92,12 +97,12 @@ class HandTranslator:
         if close != open_:
             self._gripper = CLOSED if close else OPEN
 
-    def _named(self, hand: NDArray[np.float64]) -> dict[str, float]:
+    def _named(self, hand: NDArray[np.float64], mode: float = FROM_REACHED) -> dict[str, float]:
         hand = np.clip(hand, -1.0, 1.0)
         vector = contract.join_action(
             {
                 "base_motion": np.zeros(4),
-                "control_mode": [ARM_MODE],
+                "control_mode": [mode],
                 "end_effector_position": hand[:3],
                 "end_effector_rotation": hand[3:],
                 "gripper_close": [self._gripper],

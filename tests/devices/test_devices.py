@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import enum
 import inspect
 import json
 import logging
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import h5py
 import numpy as np
@@ -16,6 +18,7 @@ from lerobot.robots.config import RobotConfig
 from lerobot.robots.utils import make_robot_from_config
 from lerobot.scripts import lerobot_record
 from lerobot.teleoperators.config import TeleoperatorConfig
+from lerobot.teleoperators.keyboard import teleop_keyboard
 from lerobot.teleoperators.utils import make_teleoperator_from_config
 from scipy.spatial.transform import Rotation
 
@@ -178,6 +181,23 @@ def test_a_phone_moves_the_hand_by_what_it_moved_while_held() -> None:
     assert translator.action(phone([0.95, 0, 0]))["eef_dx"] == 0  # held again: a new reference
 
 
+def test_a_phone_leads_by_its_goal_until_it_is_let_go() -> None:
+    translator = HandTranslator()
+    said = [translator.action(phone([x, 0, 0], enabled=on)) for x, on in ((0.0, True), (0.02, True), (0.04, False))]
+    assert [action["control_mode"] for action in said] == [-1, 1, -1]
+
+
+@pytest.mark.render
+def test_the_hand_goes_as_far_as_the_phone_did(robot: RobocasaKitchen) -> None:
+    robot._reset()
+    before = robot.get_observation()
+    for step in range(36):  # 10 cm up in a second, then held there
+        robot.send_action(phone([0.0, 0.0, min(step, 20) * 0.005]))
+    after = robot.get_observation()
+    moved = [after[name] - before[name] for name in ("eef_x", "eef_y", "eef_z")]
+    np.testing.assert_allclose(moved, [0.0, 0.0, 0.1], atol=0.01)
+
+
 class Pad:
     """Stands in for a gamepad's driver: what LeRobot's own device asks of it."""
 
@@ -200,6 +220,42 @@ def test_lerobots_gamepad_leads_the_hand() -> None:
     said = hand.get_action()
     assert list(said) == list(NAMES) == list(hand.action_features)
     assert (said["eef_dx"], said["eef_dy"], said["gripper_close"], said["control_mode"]) == (0.5, -0.25, 1, -1)
+
+
+class Key(enum.Enum):
+    """Stands in for the keys of pynput, which needs a display."""
+
+    up, down, left, right, shift, shift_r, ctrl_l, ctrl_r, esc = range(9)
+
+
+class Listener:
+    """Stands in for pynput's listener."""
+
+    def is_alive(self) -> bool:
+        return True
+
+
+def test_keys_that_are_let_go_say_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On LeRobot's own keyboard, into which its events are put by hand."""
+    monkeypatch.setattr(teleop_keyboard, "PYNPUT_AVAILABLE", True)
+    monkeypatch.setattr(teleop_keyboard, "keyboard", SimpleNamespace(Key=Key, Listener=Listener))
+    monkeypatch.setattr(teleop_keyboard, "require_package", lambda *_, **__: None)
+    hand = RobocasaHand(RobocasaHandConfig(device="keyboard_ee"))
+    hand.device.listener = Listener()
+
+    def tap(key: Key) -> tuple[float, float]:
+        """Forward and gripper while the key is down; then it is let go, and a step passes."""
+        hand.device._on_press(key)
+        said = hand.get_action()
+        hand.device._on_release(key)
+        hand.get_action()
+        return said["eef_dx"], said["gripper_close"]
+
+    assert [tap(key)[0] for key in (Key.up, Key.down, Key.up, Key.down)] == [1, -1, 1, -1]
+    assert [tap(key)[1] for key in (Key.ctrl_l, Key.ctrl_r, Key.ctrl_l, Key.ctrl_r)] == [1, -1, 1, -1]
+    tap(Key.ctrl_l)
+    hand._translator.reset()  # a new episode: the hand is open
+    assert hand.get_action()["gripper_close"] == -1
 
 
 def test_a_phone_is_read_as_lerobot_reads_it() -> None:
