@@ -16,7 +16,7 @@ from robocasa_lerobot.envs.robots.control_step import DivergedError
 from robocasa_lerobot.errors import OF_THE_MACHINE, UserError
 from robocasa_lerobot.provenance import git_commit
 from robocasa_lerobot.teleop.driving.driver import Driver
-from robocasa_lerobot.teleop.driving.pilot import AUTONOMOUS, Pilot
+from robocasa_lerobot.teleop.driving.pilot import AUTONOMOUS, Pilot, PolicyFailedError
 from robocasa_lerobot.teleop.keeping.episode import Episode
 from robocasa_lerobot.teleop.keeping.pictures import LastPictures
 from robocasa_lerobot.teleop.keeping.playback import Playback, Rewinding
@@ -271,9 +271,8 @@ class Session:
             episode.show(len(episode))
         try:
             planned = driver.next(env, episode.observation, now, lambda level, text: self.note(level, text, "assist"))
-        except Exception as error:
-            if self.pilot is None:
-                raise
+        except PolicyFailedError as error:
+            assert self.pilot is not None
             self.note("error", f"the policy failed ({error}): you drive; give back to try it again", "policy")
             self.pilot.lost()
             self.hold_still("asked")

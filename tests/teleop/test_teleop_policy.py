@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -121,6 +122,27 @@ def test_a_policy_begins_from_the_start_though_a_person_drove_before_it_was_undo
         origins = table.session.driven.origins
         assert (pilot.state, [origin.device for origin in origins]) == ("AUTONOMOUS", ["policy"] * 4)
         assert not any(origin.intervention for origin in origins)
+    env.close()
+
+
+@pytest.mark.parametrize("policy", ["", "random"])
+def test_a_click_whose_planning_fails_is_told_and_leaves_episode_and_policy(tmp_path: Path, policy: str) -> None:
+    def broken() -> Iterator[np.ndarray]:
+        yield np.zeros(contract.ACTION_SIZE)
+        raise ZeroDivisionError("no such way")
+
+    pilot, size = load_pilot(policy, TASK) if policy else (None, SIZE)
+    env = KitchenEnv(TASK, split=SPLIT, image_size=size, terminate_on_success=False)
+    with desk(tmp_path, env, pilot=pilot) as table:
+        table.say("start")
+        table.tick(3)
+        table.session.driver.assist("drive_to", broken())
+        table.tick(4)  # told, one step of it, its failure and zeros, zeros
+        assert (table.session.phase, len(table.session.driven)) == ("running", 6)
+        assert [origin.assisted for origin in table.session.driven.origins[3:]] == [True, False, False]
+        assert "the planned motion failed (ZeroDivisionError: no such way)" in table.notes()[-1]
+        assert not any("policy" in note for note in table.notes())
+        assert pilot is None or pilot._actor is not None
     env.close()
 
 

@@ -12,7 +12,8 @@ from robocasa_lerobot import contract
 from robocasa_lerobot.demos.motion import Array
 from robocasa_lerobot.demos.skills.common import SkillError
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv, Observation
-from robocasa_lerobot.teleop.driving.pilot import AUTONOMOUS, Pilot
+from robocasa_lerobot.errors import OF_THE_MACHINE
+from robocasa_lerobot.teleop.driving.pilot import AUTONOMOUS, Pilot, PolicyFailedError
 from robocasa_lerobot.teleop.driving.steering import NOTHING, Held, Steering
 from robocasa_lerobot.teleop.keeping.episode import Origin
 from robocasa_lerobot.teleop.messages import Message
@@ -112,6 +113,9 @@ class Driver:
             observation: of it.
             now: seconds.
             tell: takes a level and a line about what went wrong or ended.
+
+        Raises:
+            PolicyFailedError: it was the policy's turn, and it gave no action.
         """
         correcting = self.pilot is not None and self.pilot.state != AUTONOMOUS
         if self._waiting:
@@ -126,7 +130,10 @@ class Driver:
             if action is not None:
                 return action, Origin(self.device, "", assisted=True, intervention=correcting)
         if self.pilot is not None and self.pilot.state == AUTONOMOUS:
-            action = self.pilot.act(env, observation, env.scene.instruction)
+            try:
+                action = self.pilot.act(env, observation, env.scene.instruction)
+            except Exception as error:  # whatever it is, of a network or of a socket
+                raise PolicyFailedError(str(error)) from error
             self.steering.closed = _closes(action)  # who takes over keeps hold of what the policy holds
             return action, Origin("policy", "", policy_action=np.clip(action, -1.0, 1.0))
         return self._steered(env, NOTHING, correcting)
@@ -147,6 +154,12 @@ class Driver:
         except SkillError as error:
             self.assistance = None
             tell("warning", str(error))
+            return None
+        except OF_THE_MACHINE:
+            raise
+        except Exception as error:  # a click that cannot be planned loses nobody an episode
+            self.assistance = None
+            tell("error", f"the planned motion failed ({type(error).__name__}: {error}): drive on by hand")
             return None
         running.steps += 1
         return np.clip(action, -1.0, 1.0)

@@ -18,6 +18,10 @@ if TYPE_CHECKING:
 AUTONOMOUS, CORRECTING = "AUTONOMOUS", "CORRECTING"
 
 
+class PolicyFailedError(Exception):
+    """The policy gave no action; the text says why."""
+
+
 class Pilot:
     """A policy and whose turn it is.
 
