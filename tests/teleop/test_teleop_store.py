@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import h5py
@@ -54,6 +55,20 @@ def test_figures_that_cannot_be_written_hold_nothing_up(tmp_path: Path) -> None:
         discard(store, 1)
         save(store, 2)
         assert (store.discarded, store.saved) == (2, [2])
+
+
+def test_sessions_of_several_tasks_in_one_folder_keep_each_others_figures(tmp_path: Path) -> None:
+    tasks, times = ("CloseDrawer", "OpenDrawer", "OpenCabinet", "CloseCabinet"), 12
+
+    def work(task: str) -> None:
+        with Store(settings(tmp_path, task=task)).held() as store:
+            for number in range(times):
+                discard(store, number)
+
+    with ThreadPoolExecutor(len(tasks)) as pool:
+        list(pool.map(work, tasks))
+    figures = json.loads((tmp_path / STATS_FILE).read_text())
+    assert {task: figures[task]["discarded"] for task in figures} == {task: {"too dark": times} for task in tasks}
 
 
 def test_an_episode_that_was_saved_by_halves_counts_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -24,12 +24,14 @@ from robocasa_lerobot.demos.hdf5 import Failure, merge_parts, read_summary, reco
 from robocasa_lerobot.demos.recorder import Recording
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.files import write_text
+from robocasa_lerobot.jobs.locks import locked
 from robocasa_lerobot.jobs.publish import held_folder
 from robocasa_lerobot.teleop.settings import TeleopSettings
 
 STATS_FILE = "teleop-stats.json"
 REDO = "redo"  # reason of a discarded attempt whose kitchen comes again
 _ATTEMPTS, _SETTINGS, _ASIDE = "attempts.jsonl", "settings.json", ".partial"
+_STATS_LOCK = f".{STATS_FILE}.lock"
 
 
 @dataclass(frozen=True)
@@ -244,7 +246,8 @@ class Store:
     def _write_stats(self) -> None:
         """Write the figures, where that is possible: they follow from the attempts, and come again with the next."""
         file, own = self.settings.out / STATS_FILE, self.stats()
-        with contextlib.suppress(OSError):
+        # Sessions of several tasks may share the folder: none may read the file before another has written it.
+        with contextlib.suppress(OSError), locked(self.settings.out / _STATS_LOCK, wait=True):
             try:
                 known: dict[str, Any] = json.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
             except ValueError:
