@@ -84,4 +84,9 @@ class ClientLine:
 
     async def close(self, code: WSCloseCode, reason: str) -> None:
         """End the connection with a reason in words."""
-        await self._socket.close(code=code, message=reason.encode()[:_LONGEST_REASON])
+        await self._socket.close(code=code, message=_closing(reason))
+
+
+def _closing(reason: str) -> bytes:
+    # A client's own words may be in it: halves of a pair, which UTF-8 has not, and characters that the end would cut.
+    return reason.encode(errors="replace")[:_LONGEST_REASON].decode(errors="ignore").encode()

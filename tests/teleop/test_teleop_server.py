@@ -93,6 +93,8 @@ def test_a_page_of_another_origin_is_refused(session: Served, operator: TeleopCl
     [
         ("no message", 1008),
         ('{"type": "ack", "frame": "one"}', 1008),
+        ('{"type": "ack", "frame": "\\ud800"}', 1008),
+        (f'{{"type": "ack", "frame": 1, "{"引" * 60}": 1}}', 1008),
         ('{"type": "input", "frame": 1, "arm": [2, 0, 0, 0, 0, 0]}', 1008),
         ("x" * (LONGEST_MESSAGE + 1), 1009),
         (b"\x00\x01", 1003),
