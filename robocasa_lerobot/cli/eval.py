@@ -74,6 +74,8 @@ def run(args: argparse.Namespace) -> int:
         print("\n".join(lines(config, planned(config))))
         return 0
     if args.executor != "local":
+        if args.merge:
+            raise UserError(f"--merge joins results and runs nothing: leave --executor {args.executor} out.")
         return _run_elsewhere(config, args)
     if args.shards is not None:
         raise UserError("--shards is for --executor slurm or ray; here give --shard=I/N, and --merge at the end.")

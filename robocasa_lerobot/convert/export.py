@@ -53,6 +53,10 @@ class ExportSettings:
     def __post_init__(self) -> None:
         if self.compression not in COMPRESSIONS:
             raise UnknownNameError("compression", self.compression, COMPRESSIONS)
+        if self.cameras == ():
+            raise UserError(
+                "--cameras names no camera: name some (A,B), leave it out for all, or give --no-images for none."
+            )
 
 
 @dataclass(frozen=True)

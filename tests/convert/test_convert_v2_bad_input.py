@@ -302,6 +302,8 @@ def test_folders_and_hdf5_files_do_not_mix_and_hdf5_options_are_refused(good: Pa
         convert([good, demos], tmp_path / "out", SETTINGS)
     with pytest.raises(UserError, match="--action-key is for HDF5 files"):
         convert([good], tmp_path / "out", ConversionSettings(action_key="actions_abs"))
+    with pytest.raises(UserError, match="--extra-columns is for HDF5 files"):
+        convert([good], tmp_path / "out", ConversionSettings(extra_columns=("rewards",)))
     with pytest.raises(UserError, match=r"has the field \{obj\}"):
         convert([good], tmp_path / "out", ConversionSettings(instruction="take the {obj}"))
     assert leftovers(tmp_path / "out") == []

@@ -318,3 +318,6 @@ def test_command(ours: tuple[Path, Path, Path], tmp_path: Path, capsys: pytest.C
     assert cli.main(["export", str(ours[1]), "--out", str(out), "--no-images"]) == 0
     assert f"3 episodes, {sum(LENGTHS)} frames" in capsys.readouterr().out
     assert out.is_file()
+    assert cli.main(["export", str(ours[1]), "--out", str(tmp_path / "b.hdf5"), "--cameras", ""]) == 2
+    assert "names no camera" in capsys.readouterr().err
+    assert not (tmp_path / "b.hdf5").exists()

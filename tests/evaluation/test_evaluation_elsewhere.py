@@ -55,6 +55,14 @@ def test_shards_of_a_gpu_are_joined_where_there_is_none(tmp_path: Path, capsys: 
     assert "device: 'cuda' in the file, 'cpu' now" in capsys.readouterr().err
 
 
+def test_joining_asks_no_cluster(tmp_path: Path, ray: StandIn, capsys: pytest.CaptureFixture[str]) -> None:
+    words = arguments(tmp_path / "out", "zero", "--executor=ray", "--shards=2", "--ray.cpus=1", "--merge")
+    assert main(["eval", *words]) == 2
+    assert "--merge joins results and runs nothing: leave --executor ray out" in capsys.readouterr().err
+    assert ray.asked == []
+    assert not (tmp_path / "out").exists()
+
+
 def test_servers_are_on_devices_that_the_results_name(tmp_path: Path) -> None:
     words = arguments(tmp_path / "out", evaluation_records.make_checkpoint(tmp_path / "checkpoint"))
     for devices, remedy in (("cuda:0,cuda:1", "Set policy.device to the kind"), ("cpu,cuda:0", "cuda:0")):

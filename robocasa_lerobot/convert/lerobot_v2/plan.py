@@ -205,7 +205,7 @@ def _check_settings(settings: ConversionSettings) -> None:
     for option, given in (
         ("--mapping", settings.mapping is not None),
         ("--action-key", settings.action_key != ConversionSettings.action_key),
-        ("--extra-column", bool(settings.extra_columns)),
+        ("--extra-columns", bool(settings.extra_columns)),
     ):
         if given:
             raise UserError(f"{option} is for HDF5 files; of a LeRobot dataset, all columns are taken as they are.")
