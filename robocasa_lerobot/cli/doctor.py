@@ -74,7 +74,8 @@ def check_opengl(
     if last.renderer is None:
         failures = "; ".join(f"{r.backend}: {r.failure}" for r in results)
         if on_cpu() and not asked:
-            found = f"{failures}; without it no shadows (--preset quality), depth, segmentation and views from above"
+            lacking = "shadows (--preset quality), depth, segmentation, views from above and driving by hand (teleop)"
+            found = f"{failures}; without it no {lacking}"
             return Finding("OpenGL", "warning", found, gl.REMEDY)
         return Finding("OpenGL", "fault", failures, f"unset {gl.VARIABLE}" if asked else gl.REMEDY)
     found = f"{last.backend}: {last.renderer}"

@@ -14,7 +14,7 @@ from pathlib import Path
 from robocasa_lerobot import contract
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.web_view import WebView
-from robocasa_lerobot.gl import ensure_drawing
+from robocasa_lerobot.gl import ensure_drawing, ensure_gl
 from robocasa_lerobot.teleop.driving.pilot import Pilot, load_pilot
 from robocasa_lerobot.teleop.keeping.store import Store, check_out
 from robocasa_lerobot.teleop.loop import ControlLoop, Inbox
@@ -67,10 +67,11 @@ def run_session(
     Raises:
         UserError: unknown names, episodes of other settings, a folder that cannot be written to, a port that is
             taken, a policy that cannot be loaded; a disk that is full at the end.
-        NoOpenGLError: nothing on this machine can render.
+        NoOpenGLError: nothing on this machine can render free cameras; nothing is made then.
     """
     check_out(settings.out)
     ensure_drawing()
+    ensure_gl()  # draws the map and the picture around whoever draws the robot's cameras: said now, not to an operator
     pilot: Pilot | None = None
     size = settings.image_size
     if policy:

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 from teleop_support import SEED, SPLIT, TASK, WAIT_S, demonstration, drive
 
-from robocasa_lerobot import cli
+from robocasa_lerobot import cli, gl
 from robocasa_lerobot.demos.replay import replay
 from robocasa_lerobot.teleop.client import TeleopClient
 
@@ -136,3 +136,16 @@ def test_mistakes_are_told_in_a_sentence(tmp_path: Path, capsys: pytest.CaptureF
     wrong = ["--policy", "nowhere", "--out", str(tmp_path / f"{TASK}.hdf5")]
     assert cli.main(["teleop", "--task", TASK, *wrong]) == 2
     assert "is a file. Choose a folder." in capsys.readouterr().err
+
+
+def test_a_machine_without_opengl_is_told_before_anything_is_made(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Though the robot's own cameras are drawn without: the map is not."""
+    monkeypatch.setenv(gl.RENDERER_VARIABLE, "cpu")
+    monkeypatch.delenv(gl.VARIABLE, raising=False)
+    monkeypatch.setattr(gl, "probe", lambda backend: gl.GLProbe(backend, None, "nothing"))
+    out = tmp_path / "by_hand"
+    assert cli.main(["teleop", "--task", TASK, "--policy", "nowhere", "--port", "0", "--out", str(out)]) == 2
+    assert "apt-get install" in capsys.readouterr().err
+    assert not out.exists()
