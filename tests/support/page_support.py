@@ -94,6 +94,8 @@ class Page:
             return
         scenes = self.session.scenes
         self.click("#redo" if self.phase not in ("review", "saving") else "#review-redo")
+        if self.browser.ask("document.querySelector('#leave-dialog').open"):
+            self.click("#leave-ok")
         deadline = time.monotonic() + WAIT_S
         while self.session.scenes == scenes or self.phase != "ready":
             assert time.monotonic() < deadline, f"no fresh kitchen: {self.phase}, {self.browser.messages}"

@@ -38,6 +38,7 @@ const tiles = new Tiles($("tiles"), {
     if (state.head?.mine && ACTIVE.includes(state.head.phase)) send({ type: "reach", camera, u, v, frame: state.head.id });
   },
 });
+sources.mouse = tiles;
 const connection = new Connection({
   open() {
     state.line = true;

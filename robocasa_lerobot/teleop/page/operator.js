@@ -22,8 +22,8 @@ export class Operator {
 
   /** Let go of everything, at once. */
   release() {
-    for (const source of Object.values(this.sources)) source.release();
     this.drag = this.depth = null;
+    for (const source of Object.values(this.sources)) source.release();
     this.update();
   }
 

@@ -25,6 +25,9 @@ export class Tiles {
   }
 
   setUp(cameras) {
+    const large = this.holder.dataset.large; // from before the line was lost
+    this.holder.dataset.large = "";
+    this.holder.classList.remove("one-large");
     this.holder.replaceChildren();
     this.tiles.clear();
     this.newest.clear();
@@ -41,6 +44,7 @@ export class Tiles {
       this.listen(camera, canvas, ring);
     }
     this.holder.dataset.count = String(cameras.length);
+    if (this.tiles.has(large)) this.enlarge(large);
   }
 
   enlarge(camera) {
@@ -72,6 +76,12 @@ export class Tiles {
     for (const [name, { tile }] of this.tiles) tile.classList.toggle("lead", name === camera);
   }
 
+  /** What is dragged goes its own way, with the camera that it is meant in. */
+  axes() {
+    return null;
+  }
+
+  /** End the drag: the pointer counts again once it goes down anew. */
   release() {
     this.drop?.();
   }
@@ -97,6 +107,7 @@ export class Tiles {
     });
     canvas.addEventListener("pointermove", (event) => {
       if (!start) return;
+      if (event.buttons === 0) return end(); // it was let go where nobody heard of it
       const [dx, dy] = [event.clientX - start.x, event.clientY - start.y];
       if (!moved && Math.hypot(dx, dy) < CLICK_PX) return;
       moved = true;

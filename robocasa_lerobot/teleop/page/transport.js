@@ -7,30 +7,31 @@ const REPEAT_MS = 80;
 const UNDO_SPEED = 2; // times real time
 const SPEEDS = [1, 4];
 
+function open(dialog) {
+  dialog.returnValue = ""; // Escape leaves what the button said the time before
+  dialog.showModal();
+}
+
 export class Transport {
   constructor(send) {
     this.send = send;
     this.head = null;
     this.undoing = null;
+    this.reviewUndo = false; // its button is held
     const click = (id, action) =>
       $(id).addEventListener("click", (event) => {
         action();
         if (event.detail) event.currentTarget.blur(); // a click must not leave Space and Enter on the button
       });
     click("pause", () => this.pause());
-    for (const id of ["undo", "review-undo"]) hold($(id), (on) => this.undo(on));
+    hold($("undo"), (on) => this.undo(on));
+    hold($("review-undo"), (on) => this.undo((this.reviewUndo = on)));
     click("mark", () => send({ type: "mark" }));
     click("back-to-mark", () => send({ type: "back_to_mark" }));
     click("end", () => send({ type: "end" }));
     click("stop-assist", () => send({ type: "stop" }));
-    click("finish", () => send({ type: "finish" }));
-    for (const id of ["redo", "review-redo"]) click(id, () => send({ type: "redo" }));
-    for (const id of ["discard", "review-discard"]) {
-      click(id, () => {
-        $("discard-dialog").returnValue = ""; // Escape leaves what the button said the time before
-        $("discard-dialog").showModal();
-      });
-    }
+    for (const id of ["finish", "redo", "review-redo"]) click(id, () => this.leave(id.replace("review-", "")));
+    for (const id of ["discard", "review-discard"]) click(id, () => open($("discard-dialog")));
     click("veil-button", () => send({ type: "resume" }));
     click("save", () => send({ type: "save", trim: $("trim").checked }));
     click("continue", () => send({ type: "continue" }));
@@ -47,6 +48,18 @@ export class Transport {
       send({ type: "discard", reason });
       $("reason-text").value = "";
     });
+    $("leave-dialog").addEventListener("close", () => {
+      if ($("leave-dialog").returnValue === "ok") send({ type: this.leaving });
+    });
+  }
+
+  /** `redo` or `finish`, which lose the running episode: asked for once more where there is anything of it. */
+  leave(type) {
+    if (!this.head?.step && !this.head?.review) return this.send({ type });
+    this.leaving = type;
+    text($("leave-title"), type === "redo" ? "Do this kitchen again" : "Finish the session");
+    text($("leave-ok"), type === "redo" ? "Redo" : "Finish");
+    open($("leave-dialog"));
   }
 
   setUp(hello) {
@@ -71,7 +84,8 @@ export class Transport {
   frame(head) {
     this.head = head;
     const { phase, review } = head;
-    const ended = phase === "review" || phase === "saving";
+    // A button that is hidden is let go: the one that is held stays where it is.
+    const ended = phase === "review" || phase === "saving" || (phase === "rewinding" && this.reviewUndo);
     show($("drive-bar"), !ended && phase !== "done");
     show($("review-bar"), ended);
     text($("pause"), phase === "paused" ? "Go on" : "Pause");
