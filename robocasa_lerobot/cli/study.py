@@ -135,7 +135,8 @@ def run(args: argparse.Namespace) -> int:
                 with alone(root, "page"):
                     print(f"kept: {store(run, results)}", flush=True)
                     report()
-    report()
+    with alone(root, "page"):  # the processes of a study end at about the same time
+        report()
     print(f"written: {args.page or results / 'results.md'}")
     return 0
 

@@ -79,6 +79,25 @@ def test_data_are_made_by_one_process_at_a_time(tmp_path: Path, capsys: pytest.C
     assert "another process is at the data" in capsys.readouterr().out
 
 
+def test_the_last_page_is_written_by_one_process_at_a_time(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    kept, page = tmp_path / "kept", tmp_path / "page.md"
+    kept.mkdir()
+    words = ["study", "--report", f"--root={tmp_path}", f"--results={kept}", f"--page={page}"]
+    with alone(tmp_path, "page"):
+        other = threading.Thread(target=cli.main, args=(words,))
+        other.start()
+        said = ""
+        for _ in range(600):
+            said += capsys.readouterr().out
+            if "another process is at the page" in said or page.exists():
+                break
+            time.sleep(0.05)
+        assert "another process is at the page" in said
+        assert not page.exists()
+    other.join(60)
+    assert page.exists()
+
+
 def test_small_policies_get_a_core_each() -> None:
     assert [trainings_at_once(None, 9, cores, cuda=False) for cores in (1, 2, 64)] == [1, 2, 4]
     assert trainings_at_once(None, 9, 16, cuda=True) == 1
