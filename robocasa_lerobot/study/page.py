@@ -20,9 +20,11 @@ from robocasa_lerobot.study.tables import (
     cell,
     difference,
     failure_terms,
+    mean_of_each,
     row_trials,
     summaries,
     variants,
+    whole_trainings,
 )
 
 Sets = Mapping[str, Sequence[str]]
@@ -31,9 +33,9 @@ _HEAD = """# Results
 What small policies learn in our kitchens, and what helps them. Written by `robocasa-lerobot study` from the trials,
 curves and circumstances that are kept in {folder}. The same command makes them again, part by part, from
 nothing but seeds (`configs/study*.yaml`). Intervals are 95 % and cover the drawing of trials: what another training
-would change, the seeds beside each other show. Trials of one seed are the same in all rows of a table, and differences
-are computed from these pairs. Published numbers are of policies a thousand times as large, of human demonstrations and
-other kitchens: they show the direction of an effect, no more.
+would change, the seeds beside each other show. Trials of one seed are the same in all rows with the same evaluation,
+and differences are computed from these pairs. Published numbers are of policies a thousand times as large, of human
+demonstrations and other kitchens: they show the direction of an effect, no more.
 """
 
 
@@ -76,16 +78,18 @@ def _part(
 ) -> tuple[list[str], list[str]]:
     """Its answers, a line for each variant of a matrix or one, and all of its section below the question."""
     there = {row: trials for row in part.rows if (trials := row_trials(part, row, stored))}
-    head = ["", *part.sets, "trials", "each training"]
+    head = ["", *part.sets, "trials", f"each training, {part.sets[0]}"]
     head += [f"against {part.reference}"] if part.reference else []
     table: list[list[str]] = []
     rates: dict[str, CellRate] = {}
     against: dict[str, Estimate] = {}
+    each: dict[RowConfig, Sequence[float]] = {}  # rows may share a phase
     for row, trials in there.items():
         cells = [cell(trials, sets[task_set]) for task_set in part.sets]
         first = cells[0]
         if first is not None:
             rates[row] = first
+            each[part.rows[row]] = mean_of_each(cells) if part.matrix else first.seeds
         line = [row, *map(_shown, cells), str(len(trials)), _seeds(first)]
         if part.reference:
             compared = part.reference in there and row != part.reference
@@ -96,10 +100,18 @@ def _part(
         table.append(line)
     lifelong = summaries(part, stored, sets) if part.matrix else {}
     if part.matrix:
-        answers = [_retained(name, rows, lifelong) for name, rows in variants(part).items()]
+        answers = [
+            _retained(name, rows, lifelong, _trainings(part, rows, there)) for name, rows in variants(part).items()
+        ]
     else:
         answers = [_most(part, rates, against)]
-    lines = [*answers, "", *_markdown(head, table), "", *_between(rates)]
+    lines = [
+        *answers,
+        "",
+        *_markdown(head, table),
+        "",
+        *_between(list(each.values()), ", each the mean of its columns" * part.matrix),
+    ]
     if part.matrix:
         lines += _forgetting(len(part.sets), lifelong)
     if part.tasks:
@@ -130,7 +142,10 @@ def _most(part: PartConfig, rates: Mapping[str, CellRate], against: Mapping[str,
     if not rates:
         return "No row of the table has all its trials yet."
     if len(rates) < 3 and not against:
-        return " ".join(f"{row}: {_percent(found.rate)} of {part.sets[0]}." for row, found in rates.items())
+        return " ".join(
+            f"{row}: {_percent(found.rate)} of {part.sets[0]}{_from(part, [row], len(found.seeds))}."
+            for row, found in rates.items()
+        )
     best = max(rates, key=lambda row: rates[row].rate.value)
     most = f"Most: {best}, {_percent(rates[best].rate)}"
     if best in against:
@@ -148,19 +163,34 @@ def _once(rates: Mapping[str, CellRate], *rows: str) -> str:
     return "" if not alone else ", one training of each" if len(alone) > 1 else f", one training of {alone[0]}"
 
 
-def _between(rates: Mapping[str, CellRate]) -> list[str]:
-    found = between_trainings(rates.values())
+def _from(part: PartConfig, rows: Iterable[str], trainings: int) -> str:
+    """How many trainings a number rests on, where that is one or fewer than the part has."""
+    wanted = min(part.seeds_of(part.rows[row].experiment) for row in rows)
+    if trainings == 1:
+        return ", from one training"
+    return f", from {trainings} of {wanted} trainings" if trainings < wanted else ""
+
+
+def _between(rows: Sequence[Sequence[float]], of_what: str) -> list[str]:
+    found = between_trainings(rows)
     if found is None:
         return []
-    deviation, rows = found
+    deviation, number = found
     text = (
         f"Trainings that differ in their seed alone, each with its own trials, differ by {100 * deviation:.0f} points "
-        f"(standard deviation, from {rows} row{'s' if rows > 1 else ''}). Intervals do not cover that."
+        f"(standard deviation, from {number} row{'s' if number > 1 else ''}{of_what}). Intervals do not cover that."
     )
     return [text, ""]
 
 
-def _retained(name: str, rows: Mapping[int, str], lifelong: Mapping[str, Lifelong]) -> str:
+def _trainings(
+    part: PartConfig, rows: Mapping[int, str], there: Mapping[str, Sequence[tuple[int, StoredTrial]]]
+) -> str:
+    """How many trainings the summary of a variant rests on, where that is to be said."""
+    return _from(part, rows.values(), len(whole_trainings(there[row] for row in rows.values() if row in there)))
+
+
+def _retained(name: str, rows: Mapping[int, str], lifelong: Mapping[str, Lifelong], trainings: str) -> str:
     found, last = lifelong.get(name), max(rows)
     matrix: Mapping[int, Mapping[int, Estimate]] = {} if found is None else found.matrix
     earlier = [j for j in rows if j < last and j in matrix.get(last, {}) and j in matrix.get(j, {})]
@@ -168,7 +198,8 @@ def _retained(name: str, rows: Mapping[int, str], lifelong: Mapping[str, Lifelon
         return f"- {name}: not run to its end yet."
     after, before = _mean([matrix[last][j] for j in earlier]), _mean([matrix[j][j] for j in earlier])
     share = f", {after.value / before.value:.0%} of it" if before.value else ""
-    return f"- {name}: the earlier phases reached {_percent(before)}, and after the last one {_percent(after)}{share}."
+    kept = f"{_percent(after)}{share}{trainings}"
+    return f"- {name}: the earlier phases reached {_percent(before)}, and after the last one {kept}."
 
 
 def _forgetting(last: int, lifelong: Mapping[str, Lifelong]) -> list[str]:

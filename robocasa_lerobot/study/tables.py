@@ -57,12 +57,19 @@ def cell(trials: Sequence[tuple[int, StoredTrial]], tasks: Iterable[str]) -> Cel
     return CellRate(average_over_tasks(counts), sum(n for _, n in counts), tuple(each))
 
 
-def between_trainings(rates: Iterable[CellRate]) -> tuple[float, int] | None:
+def mean_of_each(cells: Iterable[CellRate | None]) -> tuple[float, ...]:
+    """The mean over a row's cells, those that are there, of each training."""
+    there = [found.seeds for found in cells if found is not None]
+    return tuple(float(np.mean(own)) for own in zip(*there, strict=True))
+
+
+def between_trainings(rows: Iterable[Sequence[float]]) -> tuple[float, int] | None:
     """By how much trainings differ that differ in their seed alone, each with its own trials; and of how many rows.
 
-    A standard deviation, pooled over the rows with more than one training. None where there is no such row.
+    `rows` have a rate of each training. A standard deviation, pooled over the rows with more than one training. None
+    where there is no such row.
     """
-    several = [found.seeds for found in rates if len(found.seeds) > 1]
+    several = [seeds for seeds in rows if len(seeds) > 1]
     if not several:
         return None
     squares = sum(float(np.var(seeds, ddof=1)) * (len(seeds) - 1) for seeds in several)
@@ -105,14 +112,13 @@ def variants(part: PartConfig) -> dict[str, dict[int, str]]:
 def summaries(part: PartConfig, stored: Stored, sets: Mapping[str, Sequence[str]]) -> dict[str, Lifelong]:
     """Of a part with `matrix`: what each variant of which there are trials gained and forgot.
 
-    Over those seeds that have come as far as any: what one training reached is not compared with what another kept.
+    Over their `whole_trainings`: what one training reached is not compared with what another kept.
     """
     found = {}
     for name, rows in variants(part).items():
         counts: dict[int, dict[int, list[tuple[int, int]]]] = {}
         of_rows = {phase: row_trials(part, row, stored) for phase, row in rows.items()}
-        there = [{seed for seed, _ in trials} for trials in of_rows.values() if trials]
-        whole = set.intersection(*there) if there else set()
+        whole = whole_trainings(of_rows.values())
         for phase in rows:
             trials = [trial for seed, trial in of_rows[phase] if seed in whole]
             for number, task_set in enumerate(part.sets, start=1):
@@ -122,6 +128,12 @@ def summaries(part: PartConfig, stored: Stored, sets: Mapping[str, Sequence[str]
         if counts:
             found[name] = lifelong(counts)
     return found
+
+
+def whole_trainings(rows: Iterable[Sequence[tuple[int, StoredTrial]]]) -> set[int]:
+    """Of a variant's rows: the seeds of the trainings that have come as far as any."""
+    there = [{seed for seed, _ in trials} for trials in rows if trials]
+    return set.intersection(*there) if there else set()
 
 
 def failure_terms(trials: Iterable[tuple[int, StoredTrial]], most: int = 5) -> list[tuple[str, str, int]]:

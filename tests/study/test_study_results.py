@@ -91,10 +91,10 @@ def test_a_row_has_more_trainings_than_its_part_where_it_says_so() -> None:
     assert [len(one.seeds) for one in found.values() if one] == [1, 3]
     assert more.with_seeds(2).seeds_of("many") == 2
     # 0.75, 0.5 and 1, against their mean.
-    deviation, rows = between_trainings([one for one in found.values() if one]) or (0.0, 0)
+    deviation, rows = between_trainings([one.seeds for one in found.values() if one]) or (0.0, 0)
     assert rows == 1
     assert deviation == pytest.approx(0.25)
-    assert between_trainings([one for one in found.values() if one][:1]) is None
+    assert between_trainings([one.seeds for one in found.values() if one][:1]) is None
 
 
 def test_forgetting_of_two_phases() -> None:
@@ -169,13 +169,41 @@ def test_the_table_of_phases(tmp_path: Path) -> None:
     stored = {("lifelong", 0): run("lifelong", 0, *phases)}
     write_page(StudyConfig("r", "x", {"lifelong": part}), stored, SETS, tmp_path / "results", tmp_path / "page.md")
     text = (tmp_path / "page.md").read_text(encoding="utf-8")
-    assert (
-        "plain: the earlier phases reached 100 % (51 to 100), and after the last one 25 % (5 to 70), 25% of it." in text
-    )
+    reached = "plain: the earlier phases reached 100 % (51 to 100), and after the last one 25 % (5 to 70), 25% of it"
+    assert f"{reached}, from one training." in text
     assert "|plain|38 % (" in text
     drawn = (tmp_path / "results" / "lifelong_rates.svg").read_text(encoding="utf-8")
     for words in ("plain", "after phase 2", "tasks of phase", "100 %", "25 %", "50 %"):
         assert f"<!-- {words} -->" in drawn, "a map of all phases, not of the first one's tasks alone"
+
+
+def test_a_phase_that_variants_share_counts_once_among_trainings(tmp_path: Path) -> None:
+    """The mean of both columns of phase 1 is 50 % and 25 %, of phase 2 it is 25 % of the one training that has it."""
+    rows = {"plain, after phase 1": row("lifelong", "phase1"), "plain, after phase 2": row("lifelong", "phase2")}
+    rows |= {"replay, after phase 1": row("lifelong", "phase1"), "replay, after phase 2": row("lifelong", "replay")}
+    part = PartConfig("What?", rows, ["first", "second"], 3, matrix=True)
+    first = [{"A": "++++", "B": "----"}, {"A": "++--", "B": "----"}]
+    stored = {}
+    for seed, outcomes in enumerate(first):
+        phases = [trials("phase1", outcomes), trials("phase2", {"A": "----", "B": "++--"})]
+        phases += [trials("replay", {"A": "+---", "B": "++--"})][:seed]
+        stored["lifelong", seed] = run("lifelong", seed, *phases)
+    write_page(StudyConfig("r", "x", {"lifelong": part}), stored, SETS, tmp_path / "results", tmp_path / "page.md")
+    text = (tmp_path / "page.md").read_text(encoding="utf-8")
+    # Phase 1: 50 and 25 points, a variance of 312.5; phase 2: none.
+    assert "differ by 12 points (standard deviation, from 2 rows, each the mean of its columns)." in text
+    assert "|each training, first|" in text
+    assert re.search(r"- plain: the earlier phases reached .*, from 2 of 3 trainings\.", text)
+    assert re.search(r"- replay: the earlier phases reached .*, from one training\.", text)
+
+
+def test_two_rows_say_how_many_trainings_they_rest_on(tmp_path: Path) -> None:
+    part = dataclasses.replace(PART, reference=None, seeds=3)
+    stored = {key: one for key, one in STORED.items() if key != ("few", 1)}
+    write_page(StudyConfig("r", "x", {"some": part}), stored, SETS, tmp_path / "results", tmp_path / "page.md")
+    text = (tmp_path / "page.md").read_text(encoding="utf-8")
+    assert re.search(r"few: 25 % \(.*\) of both, from one training\. many: 75 % \(.*\) of both\.\n", text)
+    assert "the same in all rows with the same evaluation" in text.replace("\n", " ")
 
 
 def phase_with_trials(folder: Path, steps: int, evaluation: str, finished: bool = True) -> None:
