@@ -18,14 +18,8 @@ from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.tasks.registry import get_task
 from robocasa_lerobot.errors import LackingMachineError, UserError
 from robocasa_lerobot.evaluation.actors.actor import Actor
-from robocasa_lerobot.evaluation.actors.checkpoint import (
-    REFERENCE_POLICIES,
-    REPLAY,
-    PolicySource,
-    check_name,
-    find_pretrained,
-    read_source,
-)
+from robocasa_lerobot.evaluation.actors.checkpoint import PolicySource, check_name, find_pretrained, read_source
+from robocasa_lerobot.evaluation.records.results import REFERENCE_POLICIES, REPLAY
 
 # Control steps: most demonstrations of the short tasks have ended by then, so that a policy that has not is astray.
 AFTER_STEPS = (100, 250)

@@ -27,6 +27,8 @@ from robocasa_lerobot.evaluation.planning.trials import make_plan
 from robocasa_lerobot.evaluation.records import results, trials_file
 from robocasa_lerobot.evaluation.records.eval_info import write_eval_info
 from robocasa_lerobot.evaluation.records.results import TrialRecord
+from robocasa_lerobot.evaluation.report import left_out
+from robocasa_lerobot.evaluation.report.gather import gather
 from robocasa_lerobot.evaluation.run import engine
 from robocasa_lerobot.evaluation.run.film import Film, FilmError
 from robocasa_lerobot.evaluation.run.rollout import RolloutError, run_trial
@@ -179,9 +181,26 @@ def test_more_trials_tasks_or_policies_can_be_added_but_settings_cannot_change(t
         evaluate(out, trials=2, seed=1)
 
 
+def test_labels_and_plans_of_before_count_again_when_they_are_given_again(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    for data in ("none", "all", "none"):
+        evaluate(out, trials=2, **{"policy.training_data": data})
+    (policy,) = gather([out]).policies
+    assert policy.info.training_data == "none"
+    # More trials are asked for, the command is killed before the first of them, and as few as before are asked for.
+    more = dataclasses.replace(policy.header, trials=50)
+    trials_file.append(out / results.TRIALS_FILE, more)
+    assert left_out.partial_runs(gather([out])) is not None
+    evaluate(out, trials=2, **{"policy.training_data": "none"})
+    assert left_out.partial_runs(gather([out])) is None
+    before = (out / results.TRIALS_FILE).read_bytes()
+    evaluate(out, trials=2, **{"policy.training_data": "none"})
+    assert (out / results.TRIALS_FILE).read_bytes() == before, "a header that is the last one is not written again"
+
+
 def test_two_evaluations_do_not_write_to_one_folder(tmp_path: Path) -> None:
     tmp_path.joinpath("out").mkdir()
-    with engine._only_writer(tmp_path / "out"), pytest.raises(UserError, match="another evaluation is writing here"):
+    with engine.only_writer(tmp_path / "out"), pytest.raises(UserError, match="another evaluation is writing here"):
         evaluate(tmp_path / "out")
 
 
@@ -282,6 +301,21 @@ def test_what_no_film_shows_is_run_again_and_must_go_the_same_way(
     assert [r.success for r in again] == [r.success for r in plain]
     assert {r.video for r in again} == {None}
     assert not list(other.rglob("*.mp4"))
+
+
+def test_an_error_of_a_film_is_called_an_error(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments: dict[str, Any] = {"policy.path": "zero", "trials": 6}
+    plain = evaluate(tmp_path / "out", **arguments)
+    monkeypatch.setenv("SLIDE_FAULTY_SEEDS", json.dumps({str(record.seed): "crash" for record in plain}))
+    again = evaluate(tmp_path / "out", videos=1, **arguments)
+    assert comparable(again) == comparable(plain)
+    said = capsys.readouterr().err
+    assert (
+        "ended in an error when it was run again for its film: RuntimeError: the block fell off. The first run" in said
+    )
+    assert "not deterministic" not in said
 
 
 def test_films_that_are_asked_for_later_have_all_workers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

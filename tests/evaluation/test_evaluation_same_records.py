@@ -24,6 +24,7 @@ from robocasa_lerobot.evaluation.actors.checkpoint import PolicySource
 from robocasa_lerobot.evaluation.config.evaluation import EvaluationConfig
 from robocasa_lerobot.evaluation.config.loader import load_config
 from robocasa_lerobot.evaluation.records.results import TRIALS_FILE, TrialRecord, read_results
+from robocasa_lerobot.evaluation.report.gather import gather
 from robocasa_lerobot.evaluation.run import engine, policy_servers
 from robocasa_lerobot.evaluation.run.merging import merge
 
@@ -59,10 +60,17 @@ def plain(tmp_path: Path) -> list[dict[str, Any]]:
     return comparable(evaluate(tmp_path / "plain"))
 
 
-def test_shards_joined_are_the_whole(tmp_path: Path, plain: list[dict[str, Any]]) -> None:
+def test_shards_joined_are_the_whole(
+    tmp_path: Path, plain: list[dict[str, Any]], capsys: pytest.CaptureFixture[str]
+) -> None:
     out = tmp_path / "out"
     assert main(["eval", *arguments(out), "--shard=2/3", "--videos=1"]) == 0
+    capsys.readouterr()
+    assert main(["report", str(out)]) == 2
+    assert "no such file; expected the trials.jsonl of an evaluation. Its shards are not" in capsys.readouterr().err
     whole = engine.prepare(load_config(EvaluationConfig, arguments(out)))
+    with engine.only_writer(out), pytest.raises(UserError, match="another evaluation is writing here"):
+        merge(whole)
     with pytest.raises(UserError, match=r"13 of 20 trials are recorded in no shard .* run the shards again"):
         merge(whole)
     for shard in (1, 3):
@@ -96,17 +104,39 @@ def test_shards_joined_are_the_whole(tmp_path: Path, plain: list[dict[str, Any]]
         merge(other)
 
 
-def test_of_trials_that_do_not_repeat_the_first_one_counts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_labels_of_before_count_again_in_shards(tmp_path: Path) -> None:
+    for data in ("none", "all", "none"):
+        words = [*arguments(tmp_path, **{"policy": "zero", "policy.training_data": data})]
+        for shard in ("1/2", "2/2"):
+            assert main(["eval", *words, f"--shard={shard}"]) == 0
+        assert main(["eval", *words, "--merge"]) == 0
+        (policy,) = gather([tmp_path]).policies
+        assert policy.info.training_data == data
+
+
+def test_of_trials_that_do_not_repeat_the_first_one_counts(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     """As where a policy behind a socket is asked again, since there are other numbers of shards now."""
     out = tmp_path / "out"
     for shard in ("1/1", "1/2", "2/2"):
         assert main(["eval", *arguments(out), f"--shard={shard}"]) == 0
     first, later = out / "shards/1-of-1" / TRIALS_FILE, out / "shards/1-of-2" / TRIALS_FILE
-    lines = [json.loads(line) for line in later.read_text().splitlines()]
-    lines = [line | ({"trajectory": "another"} if line["kind"] == "trial" else {}) for line in lines]
-    later.write_text("".join(json.dumps(line) + "\n" for line in lines))
+    stored = [json.loads(line) for line in later.read_text().splitlines()]
+
+    def change(**changes: object) -> None:
+        lines = [line | (changes if line["kind"] == "trial" else {}) for line in stored]
+        later.write_text("".join(json.dumps(line) + "\n" for line in lines))
+
     whole = engine.prepare(load_config(EvaluationConfig, arguments(out)))
-    with pytest.raises(UserError, match="not deterministic"):
+    # Other last bits and the same outcome, as on another machine: nothing that is reported depends on the choice.
+    change(trajectory="another")
+    merge(whole)
+    assert f"{later}: 10 trials ended as in {first}, but on another course" in capsys.readouterr().err
+    assert comparable(read_results(out).trials) == comparable(read_results(first.parent).trials)
+    (out / TRIALS_FILE).unlink()
+    change(trajectory="another", steps=1)
+    with pytest.raises(UserError, match=rf"{later}: .* ended otherwise than in {first}: .* Move one of the two away"):
         merge(whole)
     monkeypatch.setattr(PolicySource, "repeats", False)
     merge(whole)

@@ -12,7 +12,7 @@ import pytest
 import synthetic_runs
 
 from robocasa_lerobot.cli import main
-from robocasa_lerobot.evaluation.actors.checkpoint import REFERENCE_POLICIES, REPLAY
+from robocasa_lerobot.evaluation.records.results import REFERENCE_POLICIES, REPLAY
 from robocasa_lerobot.evaluation.report.gather import gather
 from robocasa_lerobot.evaluation.report.numbers import seconds
 from robocasa_lerobot.evaluation.report.policies import REFERENCES, describe_policy

@@ -12,14 +12,12 @@ from typing import Any
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.errors import UnknownNameError, UserError
-from robocasa_lerobot.evaluation.records.results import PolicyInfo
+from robocasa_lerobot.evaluation.records.results import REFERENCE_POLICIES, REPLAY, PolicyInfo
 from robocasa_lerobot.evaluation.remote.address import is_address, parse_address
 from robocasa_lerobot.evaluation.remote.introduction import RemotePolicy
 from robocasa_lerobot.policies.origin import ORIGIN_FILE, Origin, read_origin
 from robocasa_lerobot.policies.weight_files import WEIGHTS, adapter_alone
 
-REFERENCE_POLICIES = ("demonstrator", "random", "zero")
-REPLAY = "replay"  # written replay:FILE
 # They say where a checkpoint comes from, and change nothing of what the policy does.
 _ABOUT_TRAINING = ("train_config.json", ORIGIN_FILE)
 _PREPROCESSOR, _RENAMES = "policy_preprocessor.json", "rename_observations_processor"  # LeRobot's names

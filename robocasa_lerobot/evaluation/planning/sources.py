@@ -77,8 +77,8 @@ def _labels(config: EvaluationConfig) -> list[str]:
 
 
 def recorded_device(out: Path) -> str | None:
-    """What the policies of the results in a folder, or of its shards, computed on; None where there are no results."""
-    return next((header.device for header in _recorded_headers(out)), None)
+    """What the checkpoints of the results in a folder, or of its shards, computed on; None where there are none."""
+    return next((header.device for header in _recorded_headers(out) if header.has_checkpoints), None)
 
 
 def _recorded_remotes(out: Path) -> dict[tuple[str, str], Described]:

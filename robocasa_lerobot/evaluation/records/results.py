@@ -23,12 +23,15 @@ from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.evaluation.records.schema import OPTIONAL, SchemaError, build
 
 TRIALS_FILE = "trials.jsonl"
+SHARDS_FOLDER = "shards"
 SCHEMA_VERSION = 4
 READABLE_VERSIONS = (3, 4)  # trials of 3 do not say how far they came in their stages
 # What kind of end a trial had. Only `finished` trials ran to success or horizon; the others carry an error.
 FINISHED, CRASHED, HUNG, DIVERGED = "finished", "crashed", "hung", "diverged"
 OUTCOMES = (FINISHED, CRASHED, HUNG, DIVERGED)
 UNPERTURBED = "none"
+REFERENCE_POLICIES = ("demonstrator", "random", "zero")  # by their types
+REPLAY = "replay"  # written replay:FILE
 
 # Stands for the "/" of a label in names of folders and files.
 _SLASH = "__"
@@ -116,6 +119,11 @@ class PolicyInfo:
     # Left out of the line where there is none, so that files without it stay readable.
     remote: dict[str, Any] | None = field(default=None, metadata=OPTIONAL)
 
+    @property
+    def is_checkpoint(self) -> bool:
+        """Whether the run itself computed it, and so its device, and versions of torch, may change what it does."""
+        return self.type not in (*REFERENCE_POLICIES, REPLAY) and self.remote is None
+
 
 @dataclass(frozen=True)
 class RunHeader:
@@ -182,6 +190,11 @@ class RunHeader:
         """The first 16 hexadecimal digits of a SHA-256 over everything but the time of the start."""
         values = {name: value for name, value in self._values().items() if name != "started"}
         return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()[:16]
+
+    @property
+    def has_checkpoints(self) -> bool:
+        """Whether the run computed any policy."""
+        return any(policy.is_checkpoint for policy in self.policies.values())
 
     def to_line(self) -> str:
         """The JSON line of this header, without its newline."""
@@ -285,7 +298,10 @@ class TrialRecord:
 
 @dataclass(frozen=True)
 class Results:
-    """What a results file holds: headers by their ids, and trials, of which the last line for each key counts."""
+    """What a results file holds: headers by their ids, and trials, of which the last line for each key counts.
+
+    Headers are in the order of their last lines: a run of settings that were there before makes them the last ones.
+    """
 
     path: Path
     headers: dict[str, RunHeader]
@@ -310,13 +326,16 @@ def read_results(path: Path) -> Results:
     """
     file = path / TRIALS_FILE if path.is_dir() else path
     if not file.is_file():
-        raise ResultsError(f"{file}: no such file; expected the {TRIALS_FILE} of an evaluation.")
+        shards = " Its shards are not joined yet: `robocasa-lerobot eval ... --merge`, with their other settings."
+        there = any(file.parent.glob(f"{SHARDS_FOLDER}/*-of-*"))
+        raise ResultsError(f"{file}: no such file; expected the {TRIALS_FILE} of an evaluation.{shards * there}")
     headers: dict[str, RunHeader] = {}
     records: dict[TrialKey, TrialRecord] = {}
     for number, line in enumerate(file.read_bytes().split(b"\n")[:-1], start=1):
         if line.strip():
             item = parse_line(line.decode("utf-8", errors="replace"), f"{file}:{number}")
             if isinstance(item, RunHeader):
+                headers.pop(item.id, None)
                 headers[item.id] = item
                 continue
             if item.run not in headers:

@@ -13,6 +13,10 @@ from robocasa_lerobot.evaluation.records.results import ResultsError, RunHeader,
 
 # Other versions of these may let the same trial take another course.
 _DECIDING_VERSIONS = ("robocasa_lerobot", "mujoco")
+# Other versions of these may compute a policy's actions with other last bits, or otherwise.
+_COMPUTING_VERSIONS = ("lerobot", "torch", "onnxruntime")
+# Settings that follow from the checkpoints of a run, and say nothing of one without any.
+_OF_CHECKPOINTS = ("device", "batch_width", "runtime")
 
 
 def append(path: Path, item: RunHeader | TrialRecord) -> None:
@@ -45,9 +49,10 @@ def differences(old: RunHeader, new: RunHeader) -> list[str]:
     """What keeps the trials of two runs apart, a sentence each: settings, versions, or weights behind one label."""
     found = []
     flat_old, flat_new = _flat(old.settings), _flat(new.settings)
+    left_out = () if old.has_checkpoints and new.has_checkpoints else _OF_CHECKPOINTS
     for name in dict.fromkeys((*flat_old, *flat_new)):
         before, now = flat_old.get(name), flat_new.get(name)
-        if before != now:
+        if before != now and name not in left_out:
             found.append(f"{name}: {before!r} in the file, {now!r} now")
     for name in _DECIDING_VERSIONS:
         before, now = old.versions.get(name), new.versions.get(name)
@@ -67,7 +72,8 @@ def _short(fingerprint: str) -> str:
 
 
 def check_same_run(path: Path, headers: Iterable[RunHeader], new: RunHeader) -> None:
-    """Refuse to mix trials of different settings or checkpoints in one results file; say it of different commits.
+    """Refuse to mix trials of different settings or checkpoints in one results file; say it of different commits, and
+    of other versions of what computes policies.
 
     Raises:
         ResultsError: a setting, a deciding version or a checkpoint differs; all differences are named.
@@ -88,6 +94,24 @@ def check_same_run(path: Path, headers: Iterable[RunHeader], new: RunHeader) -> 
                 f"{new.git_commit or 'unknown'}: if trials take another course since, choose another --out.",
                 file=sys.stderr,
             )
+    # As for commits: most versions change last bits at most.
+    for before, now in dict.fromkeys(_other_versions(old, new) for old in earlier):
+        if before:
+            print(
+                f"{path} holds trials of policies computed with {before}, and it is now {now}: if they act otherwise "
+                "since, choose another --out.",
+                file=sys.stderr,
+            )
+
+
+def _other_versions(old: RunHeader, new: RunHeader) -> tuple[str, str]:
+    """What the checkpoints of two runs are computed with, as far as it differs and both say it."""
+    if not (old.has_checkpoints and new.has_checkpoints):
+        return "", ""
+    both = [name for name in _COMPUTING_VERSIONS if name in old.versions and name in new.versions]
+    other = [name for name in both if old.versions[name] != new.versions[name]]
+    before, now = (", ".join(f"{name} {one.versions[name]}" for name in other) for one in (old, new))
+    return before, now
 
 
 def _flat(values: dict[str, Any], prefix: str = "") -> dict[str, Any]:

@@ -13,12 +13,14 @@ from typing import Any
 import yaml
 
 from robocasa_lerobot.errors import UserError
-from robocasa_lerobot.evaluation.actors.checkpoint import REPLAY, PolicySource
+from robocasa_lerobot.evaluation.actors.checkpoint import PolicySource
 from robocasa_lerobot.evaluation.config.evaluation import EvaluationConfig, check_factory, output_folder
 from robocasa_lerobot.evaluation.planning import run_header as resolve
 from robocasa_lerobot.evaluation.planning.sources import open_sources, recorded_device
 from robocasa_lerobot.evaluation.planning.trials import Shard, TrialSpec, make_plan, running_order, to_film
 from robocasa_lerobot.evaluation.records.results import (
+    REPLAY,
+    SHARDS_FOLDER,
     TRIALS_FILE,
     PolicyInfo,
     Results,
@@ -43,7 +45,6 @@ from robocasa_lerobot.progress import Bar
 from robocasa_lerobot.provenance import utc_now
 
 CONFIG_FILE = "evaluation.yaml"
-SHARDS_FOLDER = "shards"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -183,7 +184,7 @@ def evaluate(evaluation: Evaluation) -> list[TrialRecord]:
     out, header = evaluation.out, evaluation.header
     out.mkdir(parents=True, exist_ok=True)
     path = out / TRIALS_FILE
-    with _only_writer(out):
+    with only_writer(out):
         if drop_torn_line(path):
             print(f"{path}: the last line was cut off by a kill; its trial runs again.", file=sys.stderr)
         earlier_runs = read_results(path) if path.exists() else Results(path, {}, [])
@@ -193,7 +194,7 @@ def evaluate(evaluation: Evaluation) -> list[TrialRecord]:
         write_text(out / CONFIG_FILE, yaml.safe_dump(dataclasses.asdict(evaluation.config), sort_keys=False))
         retry = evaluation.config.retry_errors
         todo = [spec for spec in evaluation.todo_plan if _is_missing(records.get(spec.key), retry)]
-        if header.id not in earlier_runs.headers:
+        if header.id != next(reversed(earlier_runs.headers), None):  # what was said last counts, also if said before
             append(path, header)
         for completed in _run(evaluation, running_order(todo), records):
             record = _record(completed, header)
@@ -302,9 +303,11 @@ def _with_film(earlier: TrialRecord, again: TrialRecord, out: Path) -> TrialReco
     """The record of a trial that was run again for its film, with the film if it took the same course."""
     if again.video is not None and again.trajectory == earlier.trajectory:
         return dataclasses.replace(earlier, video=again.video)
+    happened = "took another course when it was run again for its film: policy or env is not deterministic"
+    if again.error is not None:
+        happened = f"ended in an error when it was run again for its film: {_last_line(again.error).rstrip('.')}"
     print(
-        f"{earlier.label} {earlier.task} trial {earlier.trial} took another course when it was run again for its film: "
-        "policy or env is not deterministic. The first run counts, without a film.",
+        f"{earlier.label} {earlier.task} trial {earlier.trial} {happened}. The first run counts, without a film.",
         file=sys.stderr,
     )
     if again.video is not None:
@@ -374,8 +377,12 @@ def _last_line(text: str) -> str:
 
 
 @contextmanager
-def _only_writer(out: Path) -> Iterator[None]:
-    """Hold the folder's lock."""
+def only_writer(out: Path) -> Iterator[None]:
+    """Hold the folder's lock.
+
+    Raises:
+        ResultsError: another process holds it.
+    """
     try:
         with locked(out / ".lock", wait=False):
             yield

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import collections
 import dataclasses
 import os
-from collections.abc import Iterable
+import sys
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from robocasa_lerobot.evaluation.records.results import (
+    SHARDS_FOLDER,
     TRIALS_FILE,
     ResultsError,
     RunHeader,
@@ -16,7 +19,7 @@ from robocasa_lerobot.evaluation.records.results import (
     read_results,
 )
 from robocasa_lerobot.evaluation.records.trials_file import check_same_run
-from robocasa_lerobot.evaluation.run.engine import SHARDS_FOLDER, Evaluation, check_plan
+from robocasa_lerobot.evaluation.run.engine import Evaluation, check_plan, only_writer
 from robocasa_lerobot.files import written_aside
 
 _SHOWN = 10
@@ -34,19 +37,27 @@ def merge(evaluation: Evaluation) -> list[TrialRecord]:
         The records of the whole plan, in its order.
 
     Raises:
-        ResultsError: no shards, shards of other settings or with different results for one trial, or trials of the
-            plan that no shard has recorded (all that there are have been written then).
+        ResultsError: no shards, shards of other settings or with different results for one trial, trials of the plan
+            that no shard has recorded (all that there are have been written then), or another process writes here.
     """
-    out, path = evaluation.out, evaluation.out / TRIALS_FILE
+    out = evaluation.out
     folders = sorted(file.parent for file in out.glob(f"{SHARDS_FOLDER}/*-of-*/{TRIALS_FILE}"))
     if not folders:
         raise ResultsError(f"{out / SHARDS_FOLDER}: no shards; run them with --shard=1/N to --shard=N/N first.")
+    with only_writer(out):  # what it appends meanwhile would not be in the file that takes the place
+        return _join(evaluation, folders)
+
+
+def _join(evaluation: Evaluation, folders: Sequence[Path]) -> list[TrialRecord]:
+    out, path = evaluation.out, evaluation.out / TRIALS_FILE
     headers: dict[str, RunHeader] = {}
     records: dict[TrialKey, TrialRecord] = {}
+    places: dict[TrialKey, Path] = {}
+    unlike: collections.Counter[tuple[Path, Path]] = collections.Counter()
     parts = [(out, read_results(path))] if path.is_file() else []
     for folder, results in [*parts, *((folder, read_results(folder)) for folder in folders)]:
         check_same_run(results.path, results.headers.values(), evaluation.header)
-        headers |= results.headers
+        headers = _in_turn(headers, results.headers)
         for record in results.trials:
             moved = _moved(record, folder, out)
             earlier = records.get(record.key)
@@ -56,13 +67,25 @@ def merge(evaluation: Evaluation) -> list[TrialRecord]:
             if earlier is not None and earlier.comparable() != moved.comparable() and earlier.error is None:
                 if record.error is not None:
                     continue
+                if dataclasses.replace(moved, trajectory=earlier.trajectory).comparable() == earlier.comparable():
+                    unlike[places[record.key], results.path] += 1  # nothing that a report tells differs
+                    continue
                 raise ResultsError(
                     f"{results.path}: {record.label} {record.task} trial {record.trial} ended otherwise than in "
-                    "another shard: policy or env is not deterministic."
+                    f"{places[record.key]}: policy or env is not deterministic, or the two were made with something "
+                    "else. Move one of the two away, run what is missing then, and give --merge again."
                 )
             if moved.video is None and earlier is not None and earlier.comparable() == moved.comparable():
                 moved = dataclasses.replace(moved, video=earlier.video)
-            records[record.key] = moved
+            records[record.key], places[record.key] = moved, results.path
+    for (first, again), count in unlike.items():
+        print(
+            f"{again}: {count} trials ended as in {first}, but on another course, as on another machine or with other "
+            f"software. The first ones count, those of {first}.",
+            file=sys.stderr,
+        )
+    if evaluation.header.id in headers:  # the labels and plan of this command are the last ones that were given
+        headers = _in_turn(headers, {evaluation.header.id: headers[evaluation.header.id]})
     check_plan(path, records, evaluation.plan)
     write_results(path, headers.values(), records.values())
     missing = [spec for spec in evaluation.plan if spec.key not in records]
@@ -74,6 +97,11 @@ def merge(evaluation: Evaluation) -> list[TrialRecord]:
             f"{path} holds the others."
         )
     return [records[spec.key] for spec in evaluation.plan]
+
+
+def _in_turn(earlier: Mapping[str, RunHeader], later: Mapping[str, RunHeader]) -> dict[str, RunHeader]:
+    """Headers of which those that were said last are the last ones."""
+    return {**{name: header for name, header in earlier.items() if name not in later}, **later}
 
 
 def write_results(path: Path, headers: Iterable[RunHeader], records: Iterable[TrialRecord]) -> None:

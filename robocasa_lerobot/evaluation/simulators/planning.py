@@ -6,9 +6,10 @@ from collections.abc import Sequence
 from typing import Any
 
 from robocasa_lerobot.errors import UserError
-from robocasa_lerobot.evaluation.actors.checkpoint import REPLAY, PolicySource
+from robocasa_lerobot.evaluation.actors.checkpoint import PolicySource
 from robocasa_lerobot.evaluation.config.evaluation import KITCHEN_ENV_FACTORY, EvaluationConfig
 from robocasa_lerobot.evaluation.planning.trials import trial_seed
+from robocasa_lerobot.evaluation.records.results import REPLAY
 from robocasa_lerobot.evaluation.simulators.simulator import LEROBOT, Simulator, describe
 
 OWN_SCENES = "own"  # the header's split
