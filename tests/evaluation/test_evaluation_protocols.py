@@ -85,9 +85,9 @@ def test_missing_tasks_are_left_out_and_listed_unless_all_are_wanted(monkeypatch
         assert len(evaluation.plan) == 50 * len(there)
         missing = {name: len(tasks) for name, tasks in header.missing_by_set.items()}
         assert {n: missing.get(n, 0) + len(header.task_sets[n]) for n in TARGET_SETS} == TARGET_SETS
-        assert "partial: without 16 of 16 tasks of composite_seen" in str(
-            partial_sentence(header.task_sets, header.missing_tasks, header.missing_by_set)
-        )
+        said = str(partial_sentence(header.task_sets, header.missing_tasks, header.missing_by_set))
+        assert "partial: without 16 of 16 tasks of composite_seen" in said
+        assert said.endswith("; averages are over the tasks that were run."), "as the headline gives one"
     outside = engine.prepare(protocol("leaderboard", "--env.tasks=CloseDrawer")).header
     assert (outside.tasks, len(outside.missing_tasks)) == (["CloseDrawer"], 50)
     with pytest.raises(UserError, match="Did you mean 'atomic_seen'"):

@@ -156,7 +156,7 @@ def partial_sentence(
     ]
     in_sets = {task for tasks in missing_by_set.values() for task in tasks}
     parts += [task for task in missing if task not in in_sets]
-    return f"partial: without {', '.join(parts)}; no average is given over incomplete sets."
+    return f"partial: without {', '.join(parts)}; averages are over the tasks that were run."
 
 
 def perturbation_parameters(settings: PerturbationSettings) -> dict[str, dict[str, Any]]:
