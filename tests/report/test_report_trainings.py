@@ -13,9 +13,11 @@ from evaluation_records import write_results
 from robocasa_lerobot.cli import main
 from robocasa_lerobot.evaluation.config.evaluation import KITCHEN_ENV_FACTORY, EvaluationConfig
 from robocasa_lerobot.evaluation.config.loader import load_config
+from robocasa_lerobot.evaluation.report import output
 from robocasa_lerobot.evaluation.report.formats import tidy_csv
 from robocasa_lerobot.evaluation.report.gather import gather
 from robocasa_lerobot.evaluation.report.lifelong_series import all_series
+from robocasa_lerobot.evaluation.report.model import Figure
 from robocasa_lerobot.evaluation.report.policies import PolicyResult, ReportData, describe_policy, same_trials
 from robocasa_lerobot.evaluation.report.sections import comparison, data_efficiency, lifelong
 
@@ -60,6 +62,32 @@ def test_single_points_of_several_experiments_make_a_curve_and_the_section_says_
     assert [list(side) for side in data_efficiency.curves(gather([*runs, other]))] == [[50, 150], [50]]
     other = run(tmp_path, "p4", ATOMIC, training_data="other data", **labels)
     assert [list(side) for side in data_efficiency.curves(gather([*runs, other]))] == [[50, 150], [50]]
+
+
+def test_a_policy_with_more_tasks_than_the_others_takes_no_curve_away(tmp_path: Path) -> None:
+    def labelled(number: int, tasks: list[str], pretrained: bool, share: float) -> Path:
+        kind = ("scratch", "target only") if not pretrained else ("tuned", "pretraining + target")
+        about = {"experiment": kind[0], "training_data": kind[1], "demo_fraction": share, "phase": f"p{number}"}
+        return run(tmp_path, f"p{number}", tasks, **about)
+
+    cases = [(share, pretrained) for share in (0.1, 0.3, 1.0) for pretrained in (False, True)]
+    runs = [labelled(number, ATOMIC[:2], pretrained, share) for number, (share, pretrained) in enumerate(cases)]
+    before = data_efficiency.sentence(gather(runs))
+    assert before is not None
+    everywhere = [task for task, group in synthetic_runs.GROUPS.items() if group != "composite_unseen"]
+    for number, more in enumerate((ATOMIC, everywhere), start=7):
+        data = gather([*runs, labelled(number, more, True, 0.0)])
+        assert data_efficiency.sentence(data) == before
+        section = data_efficiency.section(data)
+        assert section is not None
+        titles = [part.title for part in section.parts if isinstance(part, Figure)]
+        assert titles == ["Atomic, 2 of 18 tasks"]
+        told = [text for text in section.text if "no curve, since no 3 of these policies have tasks of it" in text]
+        assert [text.partition(":")[0] for text in told] == (["Composite, seen"] if more == everywhere else [])
+    # No tasks in common at all: the section says why there is nothing to see.
+    apart = [labelled(20 + number, [ATOMIC[number]], False, share) for number, share in enumerate((0.1, 0.3, 1.0))]
+    output.write_report(apart, out=tmp_path / "report.html")
+    assert "Atomic: no curve, since no 3 of these policies" in (tmp_path / "report.md").read_text(encoding="utf-8")
 
 
 def test_phases_of_several_trainings_make_a_matrix_with_the_untrained_policy(tmp_path: Path) -> None:

@@ -20,6 +20,7 @@ ALL_DEMOS = 500
 TARGET_ONLY = "target only"
 NOTHING = "none"  # no training data at all before the target's
 ALL = "all"
+FEWEST_POINTS = 3  # of both curves together
 
 
 @dataclass
@@ -52,6 +53,11 @@ class GroupCurves:
     only: Mapping[int, Counts]
     pretrained: Mapping[int, Counts]
     left_out: tuple[str, ...]
+
+    @property
+    def is_curve(self) -> bool:
+        """Whether there are enough points to show."""
+        return len(self.only) + len(self.pretrained) >= FEWEST_POINTS
 
     @property
     def whole(self) -> bool:
@@ -96,15 +102,17 @@ def all_curves(data: ReportData) -> list[Curve]:
 
 
 def groups(only: Mapping[int, PolicyResult], pretrained: Mapping[int, PolicyResult]) -> list[GroupCurves]:
-    """The average of the benchmark's groups and each group, where the policies have several; else all their tasks."""
-    keys = [
-        key for key in published.GROUPS if any(policy.group(key) for policy in (*only.values(), *pretrained.values()))
-    ]
-    if not keys:
-        found = [_group(ALL, only, pretrained)]
-    else:
-        found = [_group(key, only, pretrained) for key in ([AVERAGE, *keys] if len(keys) > 1 else keys)]
-    return [one for one in found if len(one.only) + len(one.pretrained) >= 3]
+    """The average of the benchmark's groups and each group, where the policies have several; else all their tasks.
+
+    Those with fewer points than `FEWEST_POINTS` are no curves.
+    """
+    policies = (*only.values(), *pretrained.values())
+    keys: list[str] = [key for key in published.GROUPS if any(policy.group(key) for policy in policies)]
+    common = {key: _common(key, policies) for key in ([AVERAGE, *keys] if len(keys) > 1 else keys or [ALL])}
+    group_of = published.group_of_task()
+    if len(keys) > 1 and len({group_of[task] for task in common[AVERAGE]}) == 1:
+        del common[AVERAGE]  # nothing but that group once more
+    return [_group(key, tasks, only, pretrained) for key, tasks in common.items()]
 
 
 def published_percent(key: str, pretrained: bool, demos: int) -> float | None:
@@ -136,11 +144,21 @@ def _is_pretrained(policy: PolicyResult) -> bool:
     return (policy.info.training_data or "").strip().lower() not in (TARGET_ONLY, NOTHING)
 
 
-def _group(key: str, only: Mapping[int, PolicyResult], pretrained: Mapping[int, PolicyResult]) -> GroupCurves:
+def _common(key: str, policies: Sequence[PolicyResult]) -> frozenset[str]:
+    """The tasks on which points compare: those of the policies with most, or, where too few have them, of all."""
+    found = [names for policy in policies if (names := _tasks(policy, key))]
+    most = max(map(len, found), default=0)
+    common = frozenset[str]().union(*found).intersection(*(names for names in found if len(names) == most))
+    if sum(names >= common for names in found if common) >= FEWEST_POINTS:
+        return common
+    return common.intersection(*found) or common
+
+
+def _group(
+    key: str, common: frozenset[str], only: Mapping[int, PolicyResult], pretrained: Mapping[int, PolicyResult]
+) -> GroupCurves:
     policies = (*only.values(), *pretrained.values())
     tasks = {id(policy): _tasks(policy, key) for policy in policies}
-    most = max(map(len, tasks.values()))
-    common = frozenset.intersection(*(names for names in tasks.values() if len(names) == most))
     left_out = [policy.label for policy in policies if not common or not tasks[id(policy)] >= common]
     sides = [
         {

@@ -11,6 +11,7 @@ from robocasa_lerobot.evaluation.report import numbers as fmt
 from robocasa_lerobot.evaluation.report.efficiency_curves import (
     ALL_DEMOS,
     AVERAGE,
+    FEWEST_POINTS,
     Curve,
     GroupCurves,
     all_curves,
@@ -26,9 +27,10 @@ from robocasa_lerobot.evaluation.statistics.data_efficiency import DataWorth
 
 def section(data: ReportData) -> Section | None:
     """None where the labels do not give a curve of several amounts of target data."""
-    found = _groups(data)
-    if not found:
+    groups_of_tasks = _groups(data)
+    if not groups_of_tasks:
         return None
+    found = [group for group in groups_of_tasks if group.is_curve]
     parts: list[Figure | Table] = [_figure(group) for group in found]
     if any(group.worth() for group in found):
         parts.append(_worth_table(found))
@@ -36,6 +38,11 @@ def section(data: ReportData) -> Section | None:
         "How success grows with target demonstrations, and how many of them the same success would take without "
         "pretraining.",
         *_said(data, found),
+        *(
+            f"{group.label}: no curve, since no {FEWEST_POINTS} of these policies have tasks of it in common."
+            for group in groups_of_tasks
+            if not group.is_curve
+        ),
     ]
     return Section("data-efficiency", "What pretraining is worth", tuple(text), parts=tuple(parts))
 
@@ -52,7 +59,7 @@ def sentence(data: ReportData) -> str | None:
     if _others_data(data):
         what, amount = "of the target demonstrations", _share
     for group in _groups(data):
-        for one in group.worth():
+        for one in group.worth() if group.is_curve else ():
             if one.demos > 0:
                 bound = f"{one.bound} " if one.bound else ""
                 return (
@@ -70,8 +77,9 @@ def _chosen(data: ReportData) -> tuple[Curve | None, Curve | None]:
 
 
 def _groups(data: ReportData) -> list[GroupCurves]:
+    """Of tasks, whether their points are enough for a curve or not; none where the policies are too few for any."""
     only, pretrained = curves(data)
-    return groups(only, pretrained) if len(only) + len(pretrained) >= 3 else []
+    return groups(only, pretrained) if len(only) + len(pretrained) >= FEWEST_POINTS else []
 
 
 def _which(group: GroupCurves) -> str:
