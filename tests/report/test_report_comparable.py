@@ -11,12 +11,13 @@ import pytest
 import synthetic_runs
 
 from robocasa_lerobot.evaluation.records.results import UNPERTURBED
-from robocasa_lerobot.evaluation.report import comparable
+from robocasa_lerobot.evaluation.report import comparable, output
+from robocasa_lerobot.evaluation.report import numbers as fmt
 from robocasa_lerobot.evaluation.report.formats.film_strip import choose_films
 from robocasa_lerobot.evaluation.report.gather import gather
-from robocasa_lerobot.evaluation.report.model import Figure
+from robocasa_lerobot.evaluation.report.model import Figure, Table
 from robocasa_lerobot.evaluation.report.policies import ReportData
-from robocasa_lerobot.evaluation.report.sections import horizon, summary, tasks
+from robocasa_lerobot.evaluation.report.sections import comparison, horizon, kinds, summary, tasks
 from robocasa_lerobot.video import VideoWriter
 
 TASKS = {"OpenDrawer": 0.9, "CloseDrawer": 0.8}
@@ -57,6 +58,41 @@ def test_what_was_tried_by_other_rules_is_not_compared_in_the_headline(
     section = tasks.section(data)
     assert warning in section.parts[0].warnings
     assert "same kitchen" not in section.marks_legend
+
+
+def test_nothing_of_our_kitchens_is_said_of_another_simulator(tmp_path: Path) -> None:
+    """Whose tasks have the names of ours, as those of RoboCasa's own in LeRobot."""
+    rates = dict.fromkeys((*TASKS, *list(synthetic_runs.GROUPS)[:20]), 0.5)
+    theirs = {"settings": {"factory": "lerobot", "type": "lerobot:robocasa"}, "split": "own", "horizon_rule": "env"}
+    run = a_run(tmp_path, "pi0", rates, trials=9, **theirs)
+    output.write_report([run], out=tmp_path / "report.html")
+    said = (tmp_path / "report.md").read_text(encoding="utf-8")
+    assert "is solved when the goal held at any step. In the simulator lerobot:robocasa was tried: pi0." in said
+    for ours in ("made in code", "Ours are other kitchens", "kitchens drawn like these", "same kitchen for every"):
+        assert ours not in said
+    data = gather([run])
+    assert kinds.section(data) is None
+    table = tasks.section(data).parts[0]
+    assert isinstance(table, Table)
+    assert [column.label for column in table.columns] == ["task", "pi0", "best"]
+    # Beside one of our kitchens: the tables say which is which, and what is known of ours is of ours alone.
+    data = gather([a_run(tmp_path / "kitchens", "mine", {"OpenDrawer": 0.5}, trials=9), run])
+    table = tasks.section(data).parts[0]
+    assert isinstance(table, Table)
+    assert "Ours are other kitchens, other objects and another simulator than the published ones." in table.warnings
+    assert "In the simulator lerobot:robocasa was tried: pi0." in table.warnings
+    stages = {row[0].text: row[1].text for row in table.rows}
+    assert stages["OpenDrawer"] != fmt.NONE
+    assert stages["CloseDrawer"] == fmt.NONE
+
+
+def test_a_label_at_the_beginning_of_a_sentence_stays_as_it_is(tmp_path: Path) -> None:
+    rates = {"act": 0.01, "pi0": 0.9}
+    kept = gather([a_run(tmp_path, label, dict.fromkeys(TASKS, rate), trials=9) for label, rate in rates.items()])
+    assert summary.headline(kept).startswith("pi0 solves ")
+    assert str(comparison.sentence(kept)).startswith("pi0 is better than act by ")
+    alike = gather([a_run(tmp_path / "alike", label, trials=2) for label in ("act", "pi0")])
+    assert str(comparison.sentence(alike)).startswith("pi0 and act cannot be told apart")
 
 
 def test_what_was_tried_alike_is_compared(tmp_path: Path) -> None:

@@ -68,7 +68,7 @@ def test_perturbations_that_change_nothing_are_said_to_change_nothing(tmp_path: 
 def test_a_perturbation_alone_is_named_and_stands_beside_no_published_number(tmp_path: Path) -> None:
     report = make_report(make_run(tmp_path / "a/run", "camera"))
     text = report[".md"]
-    assert f"\nC{CALLED[1:]} solves" in text
+    assert f"\n{CALLED} solves" in text
     for said in (f"- **{CALLED}: ", "Perturbations: camera poses.", "| perturbations | camera |", f"| {CALLED} |"):
         assert said in text, said
     assert not [row for row in rows(report["_tables.csv"]) if row["policy"]]

@@ -159,9 +159,9 @@ def pair(tmp_path: Path, solved: dict[str, tuple[int, int, int]]) -> ReportData:
 
 def test_no_verdict_where_trials_and_tasks_point_different_ways(tmp_path: Path) -> None:
     said = str(comparison.sentence(pair(tmp_path / "agree", {"Large": (40, 0, 20), "Small": (2, 0, 1)})))
-    assert "B is better than a by 50.0 points" in said
+    assert "b is better than a by 50.0 points" in said
     said = str(comparison.sentence(pair(tmp_path / "disagree", {"Large": (40, 0, 20), "Small": (2, 2, 0)})))
-    assert said.startswith("B and a cannot be ranked, since the tasks disagree")
+    assert said.startswith("b and a cannot be ranked, since the tasks disagree")
     assert "better than" not in said
 
 

@@ -14,9 +14,10 @@ from typing import Any
 from robocasa_lerobot.errors import UnknownNameError
 
 # Said in the summary of every report, and in short above every table that shows our numbers beside published ones.
+PUBLISHED_SCENES = "Published numbers come from RoboCasa's own kitchens, objects and human demonstrations in robosuite"
 DIFFERENT_KITCHENS = (
-    "Published numbers come from RoboCasa's own kitchens, objects and human demonstrations in robosuite; ours come "
-    "from kitchens made in code, in another simulator. Read them as context, not as the same experiment."
+    f"{PUBLISHED_SCENES}; ours come from kitchens made in code, in another simulator. Read them as context, not as "
+    "the same experiment."
 )
 DIFFERENT_KITCHENS_SHORT = "Ours are other kitchens, other objects and another simulator than the published ones."
 TABLES = (

@@ -119,6 +119,13 @@ class PolicyResult:
         return self.headers[0]
 
     @property
+    def simulator(self) -> str | None:
+        """What its trials ran in, where that was not our kitchens: `lerobot:NAME`, or a factory of envs."""
+        settings = self.header.settings
+        factory = settings.get("factory", KITCHEN_ENV_FACTORY)
+        return None if factory == KITCHEN_ENV_FACTORY else str(settings.get("type") or Path(factory).name)
+
+    @property
     def tasks(self) -> tuple[TaskResult, ...]:
         """The tasks without perturbation, or under the only kind there is."""
         return next(iter(self.conditions.values()))

@@ -38,7 +38,7 @@ def section(data: ReportData) -> Section | None:
     found = [table for name in TRANSPOSED if (table := beside_table(data, name)) is not None]
     text = (
         "Each published number with ours beside it, where a policy of this report was trained and evaluated alike. An "
-        "average weighs every task alike; its interval is for exactly these tasks, in kitchens drawn like these. Where "
+        "average weighs every task alike; its interval is for exactly these tasks, in scenes drawn like these. Where "
         "tasks are missing there is no average, since it would be another number.",
     )
     return Section("beside", "Beside the published tables", text, parts=tuple(found)) if found else None
@@ -70,7 +70,7 @@ def beside_table(data: ReportData, name: str) -> Table | None:
         tuple(heads),
         tuple(rows),
         notes=(f"Published: {table.source}. {table.notes}".strip(),),
-        warnings=(published.DIFFERENT_KITCHENS_SHORT, *differences(policies, table.protocol), *other_types(cells)),
+        warnings=(*other_kitchens(policies), *differences(policies, table.protocol), *other_types(cells)),
         cards=True,
         sortable=False,
     )
@@ -164,7 +164,7 @@ def _table(data: ReportData, policies: list[PolicyResult], table: PublishedTable
         columns,
         tuple(rows),
         notes=(f"Published: {table.source}. {table.notes}",),
-        warnings=(published.DIFFERENT_KITCHENS_SHORT, *differences(policies, table.protocol)),
+        warnings=(*other_kitchens(policies), *differences(policies, table.protocol)),
         cards=True,
     )
 
@@ -186,6 +186,31 @@ def _covers_a_group(policy: PolicyResult) -> bool:
 def group_size(key: str) -> int:
     """Tasks of a published group; "average" is all of them."""
     return published.GROUPS.get(key, sum(published.GROUPS.values()))
+
+
+def other_kitchens(policies: Sequence[PolicyResult]) -> tuple[str, ...]:
+    """In what other kitchens than the published ones, or in what simulator, policies were tried."""
+    ours = any(policy.simulator is None for policy in policies)
+    return (*((published.DIFFERENT_KITCHENS_SHORT,) if ours else ()), *simulators(policies))
+
+
+def published_kitchens(policies: Sequence[PolicyResult]) -> str:
+    """The same for a reader who knows nothing yet of where published numbers come from."""
+    ours = any(policy.simulator is None for policy in policies)
+    theirs = published.DIFFERENT_KITCHENS if ours else f"{published.PUBLISHED_SCENES}."
+    return " ".join([theirs, *simulators(policies)])
+
+
+def simulators(policies: Sequence[PolicyResult]) -> list[str]:
+    """A sentence for each simulator that is not ours, with the policies that were tried in it."""
+    labels: dict[str, list[str]] = {}
+    for policy in policies:
+        if policy.simulator is not None:
+            labels.setdefault(policy.simulator, []).append(policy.label)
+    return [
+        f"In the simulator {name} {'was' if len(those) == 1 else 'were'} tried: {fmt.listed(those)}."
+        for name, those in labels.items()
+    ]
 
 
 def differences(policies: Sequence[PolicyResult], protocol: Mapping[str, Any]) -> list[str]:

@@ -112,7 +112,7 @@ def sentence(data: ReportData) -> str | None:
             else f" No single task of the {len(tasks)} shows a clear difference."
         )
     if overall.p_value < ALPHA:
-        return text[:1].upper() + text[1:]
+        return text
     if pair.smallest is not None:
         text += (
             f" So many trials would have shown a true difference of {100 * pair.smallest:.1f} points or more with "
@@ -120,7 +120,7 @@ def sentence(data: ReportData) -> str | None:
         )
     else:
         text += " So few trials cannot show any difference."
-    return text[:1].upper() + text[1:]
+    return text
 
 
 def _p(value: float) -> str:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from robocasa_lerobot.benchmark import published
 from robocasa_lerobot.evaluation.records.results import UNPERTURBED
 from robocasa_lerobot.evaluation.report import numbers as fmt
 from robocasa_lerobot.evaluation.report.efficiency_curves import (
@@ -21,6 +20,7 @@ from robocasa_lerobot.evaluation.report.efficiency_curves import (
 from robocasa_lerobot.evaluation.report.formats.charts import Line, line_chart
 from robocasa_lerobot.evaluation.report.model import Cell, Column, Figure, Section, Series, Table
 from robocasa_lerobot.evaluation.report.policies import PolicyResult, ReportData
+from robocasa_lerobot.evaluation.report.sections.beside_published import other_kitchens
 from robocasa_lerobot.evaluation.statistics.averages import average_over_tasks
 from robocasa_lerobot.evaluation.statistics.data_efficiency import DataWorth
 
@@ -31,7 +31,8 @@ def section(data: ReportData) -> Section | None:
     if not groups_of_tasks:
         return None
     found = [group for group in groups_of_tasks if group.is_curve]
-    parts: list[Figure | Table] = [_figure(group) for group in found]
+    kitchens = other_kitchens([policy for side in curves(data) for policy in side.values()])
+    parts: list[Figure | Table] = [_figure(group, kitchens) for group in found]
     if any(group.worth() for group in found):
         parts.append(_worth_table(found))
     text = [
@@ -135,7 +136,7 @@ def _said(data: ReportData, found: list[GroupCurves]) -> list[str]:
     return out
 
 
-def _figure(group: GroupCurves) -> Figure:
+def _figure(group: GroupCurves, kitchens: Sequence[str]) -> Figure:
     lines, rows = [], []
     for number, (name, side) in enumerate((("with pretraining", group.pretrained), ("target data only", group.only))):
         if not side:
@@ -184,7 +185,7 @@ def _figure(group: GroupCurves) -> Figure:
             Column(group.label, numeric=True, published=True),
         ),
         tuple(rows),
-        notes=("Published: GR00T N1.5 in target scenes. " + published.DIFFERENT_KITCHENS_SHORT,),
+        notes=(" ".join(("Published: GR00T N1.5 in target scenes.", *kitchens)),),
     )
     return Figure(
         f"data-efficiency-{group.key}-figure",

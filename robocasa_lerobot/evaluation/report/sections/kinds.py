@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from robocasa_lerobot.benchmark import published
 from robocasa_lerobot.benchmark.tasks import TaskFacts, task_facts
@@ -19,15 +19,21 @@ _STAGES = ((1, 1), (2, 2), (3, 3), (4, 5), (6, None))
 
 
 def section(data: ReportData) -> Section | None:
-    """None where the run has not enough tasks of two kinds in any respect."""
-    tables = [table for one in BREAKDOWNS if (table := _table(data, *one)) is not None]
+    """None where the run has not enough tasks of two kinds in any respect.
+
+    What a task is like is known of our own: policies that were tried in another simulator are left out.
+    """
+    own = [policy for policy in data.policies if policy.simulator is None]
+    tables = [table for one in BREAKDOWNS if (table := _table(data, own, *one)) is not None]
     if not tables:
         return None
     text = [
         f"Means over tasks of a kind, each task weighing the same; kinds of fewer than {MIN_TASKS} tasks are left out.",
         _mobile_totals(),
     ]
-    if len(data.policies) > MAX_POLICIES:
+    if others := [policy.label for policy in data.policies if policy not in own]:
+        text.append(f"Without {fmt.listed(others)}, tried in another simulator.")
+    if len(own) > MAX_POLICIES:
         text.append(f"The last {MAX_POLICIES} policies; the others are in the tables above.")
     return Section("kinds", "Kinds of tasks", tuple(text), parts=tuple(tables))
 
@@ -57,17 +63,23 @@ BREAKDOWNS: tuple[tuple[str, str, Callable[[TaskFacts], str | None]], ...] = (
 )
 
 
-def _table(data: ReportData, name: str, label: str, kind_of: Callable[[TaskFacts], str | None]) -> Table | None:
+def _table(
+    data: ReportData,
+    own: Sequence[PolicyResult],
+    name: str,
+    label: str,
+    kind_of: Callable[[TaskFacts], str | None],
+) -> Table | None:
     facts = task_facts()
     kinds: dict[str, list[str]] = {}
-    for task in data.task_names:
+    for task in (task for task in data.task_names if any(policy.task(task) for policy in own)):
         kind = kind_of(facts[task]) if task in facts else None
         if kind is not None:
             kinds.setdefault(kind, []).append(task)
     kinds = {kind: tasks for kind, tasks in sorted(kinds.items()) if len(tasks) >= MIN_TASKS}
     if len(kinds) < MIN_KINDS:
         return None
-    policies = data.policies[-MAX_POLICIES:]
+    policies = own[-MAX_POLICIES:]
     rows = tuple(
         (Cell(kind), Cell(f"{len(tasks)}", len(tasks)), *(_mean(policy, tasks) for policy in policies))
         for kind, tasks in kinds.items()

@@ -10,6 +10,7 @@ from robocasa_lerobot.evaluation.report.policies import PolicyResult, ReportData
 from robocasa_lerobot.evaluation.report.published_cells import OurCell, our_cells
 from robocasa_lerobot.evaluation.report.sections.beside_published import (
     differences,
+    other_kitchens,
     other_types,
     our_cell,
     published_cell,
@@ -185,7 +186,7 @@ def _published(data: ReportData) -> Table | None:
         tuple(columns),
         tuple(rows),
         notes=(f"Published: {table.source}. {table.notes}",),
-        warnings=(published.DIFFERENT_KITCHENS_SHORT, *differences(policies, table.protocol), *other_types(cells)),
+        warnings=(*other_kitchens(policies), *differences(policies, table.protocol), *other_types(cells)),
         sortable=False,
     )
 

@@ -6,6 +6,7 @@ from robocasa_lerobot.benchmark import published
 from robocasa_lerobot.evaluation.report import numbers as fmt
 from robocasa_lerobot.evaluation.report.model import Cell, Column, Section, Table
 from robocasa_lerobot.evaluation.report.policies import ReportData
+from robocasa_lerobot.evaluation.report.sections.beside_published import published_kitchens
 
 NO_TRIALS = (
     "Measured on a real robot, of which this project has no trials: constants, with nothing of ours beside them."
@@ -13,11 +14,11 @@ NO_TRIALS = (
 INSPECT = "What lies on this machine: `robocasa-lerobot inspect REGISTRY`."
 
 
-def section(_: ReportData) -> Section:
+def section(data: ReportData) -> Section:
     """Every table of the paper, and the leaderboard."""
     parts = [_table(name) for name in published.TABLES]
     parts += [_datasets(), _leaderboard()]
-    text = (published.DIFFERENT_KITCHENS,)
+    text = (published_kitchens(data.policies),)
     return Section("published", "The benchmark's published results", text, parts=tuple(parts))
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from robocasa_lerobot.benchmark import published
 from robocasa_lerobot.evaluation.records.results import UNPERTURBED
 from robocasa_lerobot.evaluation.report import comparable, left_out
 from robocasa_lerobot.evaluation.report import numbers as fmt
@@ -66,7 +65,7 @@ def headline(data: ReportData) -> str:
     alike = [one for one in before if comparable.same_tasks(one, last) and not comparable.differences(one, last)]
     if 0 < len(alike) <= 3:
         text += "; " + fmt.listed([f"{policy.label} {fmt.percent(policy.average.value)}" for policy in alike])
-    text = text[:1].upper() + text[1:] + "."
+    text += "."  # it begins with a label, which stays as it is
     others = len(before) - len(alike)
     was = "policy was" if others == 1 else "policies were"
     return text + (f" {others} more {was} tried on other tasks or by other rules." if others else "")
@@ -85,6 +84,7 @@ def what_was_run(data: ReportData) -> str:
         f"{fmt.count(len(policies), 'policy', 'policies')}, {fmt.count(len(data.task_names), 'task')}, {each} trials "
         f"of each: {fmt.count(trials, 'trial')} in {splits}. A trial lasts up to {rules} and is solved {success}."
     )
+    text = " ".join([text, *beside_published.simulators(data.policies)])
     conditions = list(dict.fromkeys(name for policy in policies for name in policy.conditions))
     if conditions != [UNPERTURBED]:
         text += f" Perturbations: {fmt.listed([robustness.spelled(name) for name in conditions])}."
@@ -99,14 +99,15 @@ def how_sure(data: ReportData) -> str:
     if len(widths) > 1:
         half = (last.average.high - last.average.low) / 2
         text += f", the average over {len(widths)} tasks to about ±{100 * half:.1f}"
-    return text + ". Intervals speak about these tasks in kitchens drawn like these, not about other tasks."
+    scenes = "kitchens" if last.simulator is None else "scenes"
+    return text + f". Intervals speak about these tasks in {scenes} drawn like these, not about other tasks."
 
 
 def beside(data: ReportData) -> str | None:
     """The published numbers that stand in the tables, and that the kitchens differ."""
     if not any(policy.group("average", UNPERTURBED) or policy.places for policy in data.policies):
         return None
-    return f"Published results stand beside ours in the tables. {published.DIFFERENT_KITCHENS}"
+    return f"Published results stand beside ours in the tables. {beside_published.published_kitchens(data.policies)}"
 
 
 def errors(data: ReportData) -> str | None:

@@ -11,12 +11,13 @@ from robocasa_lerobot.evaluation.report import comparable
 from robocasa_lerobot.evaluation.report import numbers as fmt
 from robocasa_lerobot.evaluation.report.model import Bar, Cell, Column, Section, Series, Table
 from robocasa_lerobot.evaluation.report.policies import PolicyResult, ReportData, TaskResult, trial_title
-from robocasa_lerobot.evaluation.report.sections.beside_published import differences
+from robocasa_lerobot.evaluation.report.sections.beside_published import differences, other_kitchens
 from robocasa_lerobot.evaluation.statistics import Estimate
 
 # More trials than this are a texture, no longer something to point at; with many policies there is no room.
 MAX_MARKS, MAX_MARKED_POLICIES = 60, 3
 _SAME_KITCHENS = "each square is one trial; the same place is the same kitchen for every policy"
+_SAME_STARTS = "each square is one trial; the same place is the same start for every policy"
 _OWN_KITCHENS = "each square is one trial"
 
 
@@ -30,7 +31,9 @@ def section(data: ReportData) -> Section:
     plain = [policy for policy in data.policies if policy.condition == UNPERTURBED]
     tried = {result.task for policy in plain for result in policy.tasks}
     known = {task: rate for task, rate in published.per_task_rates().items() if task in tried}
-    facts = {task: one for task, one in task_facts().items() if task in data.task_names}
+    # A simulator's tasks may have the names of ours.
+    ours = {result.task for policy in data.policies if policy.simulator is None for result in policy.tasks}
+    facts = {task: one for task, one in task_facts().items() if task in ours}
     columns = [Column("task")]
     columns += [Column("stages", numeric=True), Column("mobile")] if facts else []
     columns += [Column(policy.label, numeric=True, wide=roomy, series=data.series(policy)) for policy in data.policies]
@@ -62,12 +65,13 @@ def section(data: ReportData) -> Section:
         notes=tuple(notes),
         warnings=(
             *comparable.warnings(data.policies),
-            *((published.DIFFERENT_KITCHENS_SHORT, *differences(plain, protocol)) if known else ()),
+            *((*other_kitchens(plain), *differences(plain, protocol)) if known else ()),
         ),
         cards=True,
     )
     series = tuple(Series(policy.label, data.series(policy)) for policy in data.policies)
-    legend = "" if not marks else _SAME_KITCHENS if _in_line(data.policies) else _OWN_KITCHENS
+    same = _SAME_KITCHENS if ours else _SAME_STARTS
+    legend = "" if not marks else same if _in_line(data.policies) else _OWN_KITCHENS
     return Section("tasks", "Task by task", parts=(table,), legend=series, marks_legend=legend)
 
 
