@@ -28,7 +28,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     facts.add_argument("--paper-link", default="N/A", metavar="URL")
     facts.add_argument("--commit-hash", help="default: the commit that the run was made with")
     facts.add_argument("--wandb", metavar="URL")
-    facts.add_argument("--batch-size", type=int, help="global batch; default: from the checkpoint's train_config.json")
+    facts.add_argument("--batch-size", type=int, help="global batch; default: from a checkpoint that was trained here")
     facts.add_argument("--num-training-steps", type=int, help="default: from the checkpoint")
     facts.add_argument("--notes", default="", help="added to the notes on simulator, trials and intervals")
 

@@ -15,6 +15,7 @@ from robocasa_lerobot.evaluation.leaderboard import protocol
 from robocasa_lerobot.evaluation.leaderboard.submission import overall, problems
 from robocasa_lerobot.evaluation.records.results import RunHeader, TrialRecord
 from robocasa_lerobot.evaluation.report.gather import gather
+from robocasa_lerobot.policies.origin import Origin
 
 FACTS = ("--model-name", "Test", "--batch-size", "128", "--num-training-steps", "1000")
 RATES = {"atomic_seen": 43.0, "composite_seen": 9.6, "composite_unseen": 4.4}
@@ -119,13 +120,19 @@ def test_facts_that_are_missing_or_wrong_are_named(
     assert main(["leaderboard"]) == 2
 
 
-def test_batch_and_steps_come_from_the_checkpoint(tmp_path: Path) -> None:
+def test_batch_and_steps_come_from_the_checkpoint(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     checkpoint = tmp_path / "pretrained_model"
     checkpoint.mkdir()
     (checkpoint / "train_config.json").write_text(json.dumps({"batch_size": 96, "steps": 777}))
     run = make_run(tmp_path / "run", {"policies": {"p": synthetic_runs.policy("p", path=str(checkpoint))}})
     out = tmp_path / "s.json"
-    assert main(["leaderboard", str(run), "-o", str(out), "--model-name", "M"]) == 0
+    words = ["leaderboard", str(run), "-o", str(out), "--model-name", "M"]
+    assert main(words) == 2, "lerobot-train's, of as many processes as nobody knows"
+    assert "batch_size of 96, which lerobot-train counts for each process: give --batch-size" in capsys.readouterr().err
+    assert main([*words, "--batch-size=768"]) == 0
+    assert json.loads(out.read_text())["training_config"] == {"batch_size": 768, "num_training_steps": 777}
+    Origin(experiment="e").write(checkpoint)
+    assert main(words) == 0
     assert json.loads(out.read_text())["training_config"] == {"batch_size": 96, "num_training_steps": 777}
 
 

@@ -14,6 +14,7 @@ from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.evaluation.leaderboard.protocol import reasons
 from robocasa_lerobot.evaluation.records.results import UNPERTURBED
 from robocasa_lerobot.evaluation.report.policies import PolicyResult, average_of
+from robocasa_lerobot.policies.origin import ORIGIN_FILE
 
 NOT_AVAILABLE = "N/A"
 
@@ -31,7 +32,7 @@ class SubmissionFacts:
     date: YYYY-MM-DD; default: today.
     submission_source: "external", or "internal" for RoboCasa's own team.
     open_source: "yes", or "no" (which means giving the RoboCasa team private access to checkpoint and code).
-    batch_size: the global batch; default: from the checkpoint's train_config.json.
+    batch_size: the global batch; default: from the train_config.json of a checkpoint that was trained here.
     num_training_steps: default: from the checkpoint's folder or its train_config.json.
     commit_hash: of the code that trained and evaluated; default: the run's.
     notes: added to the fixed ones: which simulator, trials, intervals.
@@ -62,7 +63,7 @@ def make_submission(policy: PolicyResult, facts: SubmissionFacts) -> dict[str, A
     values: dict[str, Any] = {}
     if not found:
         values = _values(policy, facts)
-        found = problems(values)
+        found = [*problems(values), *_of_one_process(policy, facts)]
     if found:
         raise SubmissionError("this run cannot be submitted:\n" + "\n".join(f"- {reason}" for reason in found))
     return values
@@ -86,6 +87,7 @@ def overall(values: dict[str, Any]) -> float:
 
 def _values(policy: PolicyResult, facts: SubmissionFacts) -> dict[str, Any]:
     config = _train_config(Path(policy.info.path))
+    batch_size = config.get("batch_size") if _trained_here(policy) else None
     versions = policy.header.versions
     values: dict[str, Any] = {
         "model_name": facts.model_name,
@@ -100,7 +102,7 @@ def _values(policy: PolicyResult, facts: SubmissionFacts) -> dict[str, Any]:
         "paper_link": facts.paper_link,
         "open_source": facts.open_source,
         "training_config": {
-            "batch_size": facts.batch_size if facts.batch_size is not None else config.get("batch_size"),
+            "batch_size": facts.batch_size if facts.batch_size is not None else batch_size,
             "num_training_steps": facts.num_training_steps
             if facts.num_training_steps is not None
             else policy.info.step or config.get("steps"),
@@ -139,6 +141,22 @@ def _weights(policy: PolicyResult) -> str:
     if policy.info.remote is None:
         return f"Weights {policy.info.fingerprint[:16]}."
     return f"Asked over {policy.info.remote['protocol']}, key map {policy.info.remote['keys']}; weights unknown."
+
+
+def _trained_here(policy: PolicyResult) -> bool:
+    """Whether this project trained it, whose batches are counted over all processes; LeRobot's are those of one."""
+    return (Path(policy.info.path) / ORIGIN_FILE).is_file()
+
+
+def _of_one_process(policy: PolicyResult, facts: SubmissionFacts) -> list[str]:
+    """Why the batch that a checkpoint names is not taken."""
+    own = _train_config(Path(policy.info.path)).get("batch_size")
+    if facts.batch_size is not None or own is None or _trained_here(policy):
+        return []
+    return [
+        f"{Path(policy.info.path) / 'train_config.json'} has a batch_size of {own}, which lerobot-train counts for "
+        "each process: give --batch-size, that of all processes together"
+    ]
 
 
 def _train_config(checkpoint: Path) -> dict[str, Any]:
