@@ -17,8 +17,9 @@ from robocasa_lerobot.cli import main
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.evaluation.config.evaluation import EvaluationConfig
 from robocasa_lerobot.evaluation.config.loader import load_config
+from robocasa_lerobot.evaluation.planning.sources import recorded_device
 from robocasa_lerobot.evaluation.records.results import TRIALS_FILE, read_results
-from robocasa_lerobot.evaluation.records.trials_file import append
+from robocasa_lerobot.evaluation.records.trials_file import append, differences
 from robocasa_lerobot.evaluation.run import distributed, engine
 from robocasa_lerobot.jobs.executors import Execution
 
@@ -156,3 +157,22 @@ def test_workers_are_as_many_as_the_cores_that_a_process_may_use(monkeypatch: py
     config = load_config(EvaluationConfig, arguments(Path("out")))
     assert [config.worker_count(trials) for trials in (2, 100)] == [2, 3]
     assert dataclasses.replace(config, workers=5).worker_count(100) == 5
+
+
+def test_a_checkpoint_is_added_to_what_computes_none(tmp_path: Path) -> None:
+    """Device, batches and runtime follow from the checkpoints of a command."""
+    on_gpu = {"seed": 0, "split": "target", "device": "cuda", "batch_width": 8}
+    on_cpu = {"seed": 0, "split": "target", "device": "cpu", "batch_width": 1, "runtime": "onnx"}
+    mine = dataclasses.replace(evaluation_records.header("mine", type="act"), settings=on_gpu, device="cuda")
+    other = dataclasses.replace(evaluation_records.header("other", type="act"), settings=on_cpu)
+    for reference in ({"type": "zero"}, {"type": "replay"}, {"type": "openpi", "remote": {"address": "openpi://a:1"}}):
+        one = dataclasses.replace(evaluation_records.header("reference", **reference), settings=on_cpu)
+        assert differences(one, mine) == differences(mine, one) == []
+        assert len(differences(mine, dataclasses.replace(one, settings={**on_cpu, "seed": 1}))) == 1
+        folder = tmp_path / str(reference["type"])
+        folder.mkdir()
+        append(folder / TRIALS_FILE, one)
+        assert recorded_device(folder) is None
+        append(folder / TRIALS_FILE, mine)
+        assert recorded_device(folder) == "cuda"
+    assert len(differences(mine, other)) == 3

@@ -20,7 +20,6 @@ from robocasa_lerobot.evaluation.actors import checkpoint as checkpoints
 from robocasa_lerobot.evaluation.config.evaluation import EvaluationConfig, PolicySettings, output_folder
 from robocasa_lerobot.evaluation.config.loader import load_config
 from robocasa_lerobot.evaluation.planning.run_header import outcome_settings, plan_tasks
-from robocasa_lerobot.evaluation.planning.sources import recorded_device
 from robocasa_lerobot.evaluation.planning.trials import make_plan, trial_seed
 from robocasa_lerobot.evaluation.records import results, trials_file
 from robocasa_lerobot.evaluation.records.results import (
@@ -184,25 +183,6 @@ def test_trials_of_another_torch_are_mixed_with_a_warning(capsys: pytest.Capture
     zero = dataclasses.replace(new, policies=header(type="zero").policies)
     trials_file.check_same_run(Path("t"), [dataclasses.replace(old, policies=zero.policies)], zero)
     assert capsys.readouterr().err == ""
-
-
-def test_a_checkpoint_is_added_to_what_computes_none(tmp_path: Path) -> None:
-    """Device, batches and runtime follow from the checkpoints of a command."""
-    on_gpu = {"seed": 0, "split": "target", "device": "cuda", "batch_width": 8}
-    on_cpu = {"seed": 0, "split": "target", "device": "cpu", "batch_width": 1, "runtime": "onnx"}
-    mine = dataclasses.replace(header("mine", type="act"), settings=on_gpu, device="cuda")
-    other = dataclasses.replace(header("other", type="act"), settings=on_cpu)
-    for reference in ({"type": "zero"}, {"type": "replay"}, {"type": "openpi", "remote": {"address": "openpi://a:1"}}):
-        one = dataclasses.replace(header("reference", **reference), settings=on_cpu)
-        assert trials_file.differences(one, mine) == trials_file.differences(mine, one) == []
-        assert len(trials_file.differences(mine, dataclasses.replace(one, settings={**on_cpu, "seed": 1}))) == 1
-        folder = tmp_path / str(reference["type"])
-        folder.mkdir()
-        write(folder / results.TRIALS_FILE, one)
-        assert recorded_device(folder) is None
-        write(folder / results.TRIALS_FILE, mine)
-        assert recorded_device(folder) == "cuda"
-    assert len(trials_file.differences(mine, other)) == 3
 
 
 def test_config_from_arguments_in_either_spelling() -> None:
