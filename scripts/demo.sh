@@ -19,9 +19,15 @@ WORKERS=${WORKERS:-$CORES}
 
 export HF_HUB_OFFLINE=1 # nothing of the demo is downloaded
 export HF_HOME="${HF_HOME:-$PWD/$OUT/cache}"
-# One choice for all steps, made once: EGL if it renders, else OSMesa.
-MUJOCO_GL=${MUJOCO_GL:-$("$PYTHON" -m robocasa_lerobot.gl)}
-[ "$MUJOCO_GL" = default ] || export MUJOCO_GL
+# One choice for all steps, made once: OpenGL where a GPU is behind it, else our own code, which needs none.
+if [ -z "${MUJOCO_GL:-}" ]; then
+    choice=$("$PYTHON" -c 'from robocasa_lerobot.gl import ensure_drawing; print(ensure_drawing() or "cpu")')
+    case $choice in
+        cpu) export ROBOCASA_LEROBOT_RENDERER=cpu ;;
+        default) ;;
+        *) export MUJOCO_GL="$choice" ;;
+    esac
+fi
 
 started=$(date +%s)
 step() {

@@ -1,10 +1,15 @@
-"""The script that runs the fast tests: every folder is in one of its two parts, and a failure of either is told."""
+"""The scripts of the repository.
+
+That of the fast tests runs every folder in one of its two parts, and tells a failure of either; that of the demo needs
+no OpenGL.
+"""
 
 from __future__ import annotations
 
 import os
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -16,6 +21,14 @@ shift 2
 echo "$*" >> "$NOTES"
 case " $* " in *" $FAILS "*) echo "bad in $*"; exit 1 ;; esac
 echo "good"
+"""
+
+FIRST_STEP = """#!/bin/sh
+# Stands in for Python: notes who draws at the first command, and ends there.
+case " $* " in *" robocasa_lerobot.cli "*)
+    echo "${MUJOCO_GL:-} ${ROBOCASA_LEROBOT_RENDERER:-} $*" > "$NOTES"; exit 7 ;;
+esac
+exec "$REAL" "$@"
 """
 
 
@@ -71,3 +84,24 @@ def test_a_failure_of_either_part_is_one_of_the_whole(checkout: Path, fails: str
 def test_what_is_asked_for_is_run_by_itself(checkout: Path) -> None:
     assert run(checkout, "tests/envs", "-x")[2] == ["tests/envs -x"]
     assert run(checkout, cores="1")[2] == ["--in-turns"]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems have OpenGL")
+@pytest.mark.parametrize(("asked", "noted"), [("", " cpu -m"), ("osmesa", "osmesa  -m")])
+def test_the_demo_starts_on_a_machine_without_opengl(tmp_path: Path, asked: str, noted: str) -> None:
+    """As the kitchens do, which it makes; a backend that is asked for stays."""
+    python, notes = tmp_path / "python", tmp_path / "notes"
+    python.write_text(FIRST_STEP)
+    python.chmod(0o755)
+    chosen = {"MUJOCO_GL", "ROBOCASA_LEROBOT_RENDERER", "MUJOCO_EGL_DEVICE_ID", "HF_HOME"}
+    environment = {
+        **{name: value for name, value in os.environ.items() if name not in chosen}, "PYTHON": str(python),
+        "REAL": sys.executable, "NOTES": str(notes), "MUJOCO_GL": asked, "PYTHONPATH": str(REPOSITORY),
+        "__EGL_VENDOR_LIBRARY_FILENAMES": str(tmp_path / "no_vendor.json"),
+    }  # fmt: skip
+    done = subprocess.run(
+        ["sh", str(REPOSITORY / "scripts" / "demo.sh")],
+        cwd=tmp_path, capture_output=True, text=True, env=environment, check=False,
+    )  # fmt: skip
+    assert done.returncode == 7, done.stderr
+    assert notes.read_text().startswith(f"{noted} robocasa_lerobot.cli demos --tasks OpenDrawer --episodes 280 ")
