@@ -16,6 +16,8 @@ import pytest
 from convert_support import write_demos
 
 from robocasa_lerobot import contract
+from robocasa_lerobot.convert import pipeline
+from robocasa_lerobot.convert.settings import ConversionSettings
 from robocasa_lerobot.errors import UnknownNameError, UserError
 from robocasa_lerobot.video import frames_and_rate, read_frames
 
@@ -97,8 +99,7 @@ def test_lift_comes_from_the_package_that_carries_it(tmp_path: Path) -> None:
         pytest.skip(str(error))
     path = demos.cut_lift(tmp_path, 2, assets)
     assert list(demos.demo_lengths(path).values()) == [2, 2, 2]
-    pipeline = pytest.importorskip("robocasa_lerobot.convert.pipeline")
-    settings = pipeline.ConversionSettings(asset_roots=(str(assets),), image_size=32)
+    settings = ConversionSettings(asset_roots=(str(assets),), image_size=32)
     assert pipeline.convert([path], tmp_path / "lift", settings).num_frames == 6
 
 

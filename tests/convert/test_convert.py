@@ -17,14 +17,9 @@ import h5py
 import numpy as np
 import pytest
 from convert_support import INSTRUCTION, leftovers, tree_hashes, write_demos
-
-from robocasa_lerobot import cli, contract
-from robocasa_lerobot.errors import UserError
-from robocasa_lerobot.jsonl import read_jsonl
-
-pytest.importorskip("lerobot.datasets")
 from lerobot.datasets.lerobot_dataset import LeRobotDataset
 
+from robocasa_lerobot import cli, contract
 from robocasa_lerobot.convert import pipeline
 from robocasa_lerobot.convert.pipeline import convert
 from robocasa_lerobot.convert.record_files import META_FOLDER
@@ -32,6 +27,8 @@ from robocasa_lerobot.convert.settings import ConversionSettings, Plan, Shard
 from robocasa_lerobot.convert.shard import ShardOutcome
 from robocasa_lerobot.convert.verify import verify
 from robocasa_lerobot.convert.writing.statistics import column
+from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.jsonl import read_jsonl
 
 SETTINGS = ConversionSettings()
 

@@ -14,20 +14,17 @@ import h5py
 import numpy as np
 import pytest
 from convert_support import INSTRUCTION, leftovers, write_demos
-
-from robocasa_lerobot import cli, contract
-from robocasa_lerobot.errors import UserError
-from robocasa_lerobot.jsonl import read_jsonl
-
-pytest.importorskip("lerobot.datasets")
 from lerobot.datasets.lerobot_dataset import LeRobotDataset
 
+from robocasa_lerobot import cli, contract
 from robocasa_lerobot.convert.pipeline import convert
 from robocasa_lerobot.convert.reading import hdf5
 from robocasa_lerobot.convert.reading.safe_scan import CPU_SECONDS
 from robocasa_lerobot.convert.record_files import ACTIONS_OUT_OF_RANGE, CONVERSION_FILE, META_FOLDER
 from robocasa_lerobot.convert.settings import ConversionSettings, make_plan
 from robocasa_lerobot.convert.verify import verify
+from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.jsonl import read_jsonl
 
 SETTINGS = ConversionSettings()
 STEPS = 6

@@ -15,8 +15,6 @@ import psutil
 import pytest
 from convert_support import moving_pictures
 
-pytest.importorskip("lerobot.datasets")
-
 from robocasa_lerobot.convert.writing import encoding_process
 from robocasa_lerobot.convert.writing.encoder import (
     CODECS,

@@ -9,13 +9,10 @@ import pytest
 from convert_support import leftovers, tree_hashes, write_demos
 
 from robocasa_lerobot import cli
-from robocasa_lerobot.errors import UserError
-
-pytest.importorskip("lerobot.datasets")
-
 from robocasa_lerobot.convert.pipeline import convert
 from robocasa_lerobot.convert.record_files import META_FOLDER
 from robocasa_lerobot.convert.settings import ConversionSettings
+from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.jobs.executors import Execution, RaySettings, SlurmSettings
 
 

@@ -13,16 +13,13 @@ from convert_support import leftovers
 from fuzz_support import DAMAGES, base_file, in_child, mutate
 
 from robocasa_lerobot import contract
-from robocasa_lerobot.errors import UserError
-from robocasa_lerobot.jsonl import read_jsonl
-
-pytest.importorskip("lerobot.datasets")
-
 from robocasa_lerobot.convert.pipeline import convert
 from robocasa_lerobot.convert.record_files import META_FOLDER
 from robocasa_lerobot.convert.settings import ConversionSettings
 from robocasa_lerobot.convert.verify import verify
 from robocasa_lerobot.convert.writing.statistics import column
+from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.jsonl import read_jsonl
 
 VARIANTS = 12
 SECONDS = 60.0

@@ -10,16 +10,13 @@ import pytest
 from convert_support import SCENE, leftovers, write_demos
 
 from robocasa_lerobot import contract
-from robocasa_lerobot.errors import UserError
-
-pytest.importorskip("lerobot.datasets")
-
 from robocasa_lerobot.convert.pipeline import convert
 from robocasa_lerobot.convert.reading import hdf5
 from robocasa_lerobot.convert.reading.demo_file import DemoFile, RejectedEpisodeError
 from robocasa_lerobot.convert.reading.mjcf import AssetFinder, loadable
 from robocasa_lerobot.convert.reading.mjcf_limits import MAX_DEPTH
 from robocasa_lerobot.convert.settings import ConversionSettings
+from robocasa_lerobot.errors import UserError
 
 SETTINGS = ConversionSettings()
 STEPS = 6

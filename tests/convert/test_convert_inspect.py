@@ -64,7 +64,6 @@ LAYOUTS: dict[str, tuple[Callable[[Path], Path], str | None, str]] = {
 @pytest.mark.costly
 @pytest.mark.parametrize("case", LAYOUTS)
 def test_layouts_are_understood_and_their_drafts_convert(case: str, tmp_path: Path) -> None:
-    pytest.importorskip("lerobot.datasets")
     from robocasa_lerobot.convert.pipeline import convert
     from robocasa_lerobot.convert.verify import verify
 
@@ -91,7 +90,6 @@ def test_layouts_are_understood_and_their_drafts_convert(case: str, tmp_path: Pa
 
 @pytest.mark.render
 def test_a_draft_for_a_file_without_pictures_renders(tmp_path: Path) -> None:
-    pytest.importorskip("lerobot.datasets")
     from robocasa_lerobot.convert.pipeline import convert
     from robocasa_lerobot.convert.verify import verify
 
@@ -121,7 +119,6 @@ def test_real_dataset(shared: Path, capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_our_datasets_name_their_sources(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    pytest.importorskip("lerobot.datasets")
     source = _pictures(tmp_path / "a.hdf5")
     with h5py.File(source, "a") as file:
         file["data/demo_1/actions"][0, 0] = np.nan

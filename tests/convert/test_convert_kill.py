@@ -19,14 +19,11 @@ import psutil
 import pytest
 from convert_support import leftovers, tree_hashes, write_demos
 
-from robocasa_lerobot.errors import UserError
-
-pytest.importorskip("lerobot.datasets")
-
 from robocasa_lerobot.convert import pipeline
 from robocasa_lerobot.convert.pipeline import convert
 from robocasa_lerobot.convert.record_files import META_FOLDER
 from robocasa_lerobot.convert.settings import ConversionSettings
+from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.jobs.publish import held_folder, partial_folder
 
 EPISODES = 60

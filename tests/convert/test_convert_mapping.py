@@ -19,21 +19,18 @@ from convert_layouts import (
     write_robosuite,
 )
 from convert_support import INSTRUCTION, SCENE, write_demos
+from lerobot.datasets.lerobot_dataset import LeRobotDataset
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.convert.mapping.robots import choose_mapping
-from robocasa_lerobot.convert.reading.demo_file import DemoFile
-from robocasa_lerobot.convert.settings import ConversionSettings, make_plan
-from robocasa_lerobot.errors import UserError
-from robocasa_lerobot.jsonl import read_jsonl
-
-pytest.importorskip("lerobot.datasets")
-from lerobot.datasets.lerobot_dataset import LeRobotDataset
-
 from robocasa_lerobot.convert.pipeline import convert
+from robocasa_lerobot.convert.reading.demo_file import DemoFile
 from robocasa_lerobot.convert.record_files import META_FOLDER
+from robocasa_lerobot.convert.settings import ConversionSettings, make_plan
 from robocasa_lerobot.convert.verify import verify
 from robocasa_lerobot.convert.writing.statistics import column
+from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.jsonl import read_jsonl
 
 BOTH = ("robot0_right_", "robot0_left_")
 TWO = ("robot0_", "robot1_")

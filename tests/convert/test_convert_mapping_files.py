@@ -12,17 +12,14 @@ import pytest
 import yaml
 from convert_layouts import write_aloha, write_libero
 from convert_support import INSTRUCTION, moving_pictures, write_demos
-
-from robocasa_lerobot.convert.mapping.custom import EXAMPLE, FIXED_ARM_EXAMPLE, parse_mapping, read_mapping
-from robocasa_lerobot.convert.settings import ConversionSettings, make_plan
-from robocasa_lerobot.errors import UserError
-
-pytest.importorskip("lerobot.datasets")
 from lerobot.datasets.lerobot_dataset import LeRobotDataset
 
+from robocasa_lerobot.convert.mapping.custom import EXAMPLE, FIXED_ARM_EXAMPLE, parse_mapping, read_mapping
 from robocasa_lerobot.convert.pipeline import convert
+from robocasa_lerobot.convert.settings import ConversionSettings, make_plan
 from robocasa_lerobot.convert.verify import verify
 from robocasa_lerobot.convert.writing.statistics import column
+from robocasa_lerobot.errors import UserError
 
 ALOHA: dict[str, Any] = {
     "robot_type": "ALOHA",

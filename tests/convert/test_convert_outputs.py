@@ -13,14 +13,9 @@ import numpy as np
 import pytest
 from convert_support import leftovers, tree_hashes, write_demos
 from fuzz_support import in_child
-
-from robocasa_lerobot import contract
-from robocasa_lerobot.errors import UserError
-
-pytest.importorskip("lerobot.datasets")
-
 from lerobot.datasets.dataset_metadata import CODEBASE_VERSION
 
+from robocasa_lerobot import contract
 from robocasa_lerobot.convert import pipeline
 from robocasa_lerobot.convert.pipeline import ConversionResult, convert
 from robocasa_lerobot.convert.reading.hdf5 import SourceError
@@ -29,6 +24,7 @@ from robocasa_lerobot.convert.settings import ConversionSettings, Plan
 from robocasa_lerobot.convert.verify import verify
 from robocasa_lerobot.convert.writing import card
 from robocasa_lerobot.convert.writing.encoding_process import EncodingProcess
+from robocasa_lerobot.errors import UserError
 
 SETTINGS = ConversionSettings()
 STEPS = 6

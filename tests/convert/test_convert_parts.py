@@ -177,7 +177,6 @@ def _shortened(shared: Path, path: Path, steps: int) -> Path:
 
 
 def test_human_demonstrations_are_understood(shared: Path) -> None:
-    pytest.importorskip("lerobot.datasets")
     assets = shared / "real" / "robosuite_lift" / "assets"
     source = shared / "real" / "robosuite_lift" / "demo.hdf5"
     plan = make_plan([source], ConversionSettings(asset_roots=(str(assets),)))
@@ -193,7 +192,6 @@ def test_human_demonstrations_are_understood(shared: Path) -> None:
 @pytest.mark.render
 def test_human_demonstrations_round_trip(shared: Path, tmp_path: Path) -> None:
     """Three steps of each demo at a small size; the whole file is a slow test."""
-    pytest.importorskip("lerobot.datasets")
     from robocasa_lerobot.convert.pipeline import convert
     from robocasa_lerobot.convert.verify import verify
 
@@ -209,7 +207,6 @@ def test_human_demonstrations_round_trip(shared: Path, tmp_path: Path) -> None:
 @pytest.mark.render
 @pytest.mark.timeout(1800)
 def test_all_human_demonstrations(shared: Path, tmp_path: Path) -> None:
-    pytest.importorskip("lerobot.datasets")
     from robocasa_lerobot.convert.pipeline import convert
     from robocasa_lerobot.convert.verify import verify
 
@@ -233,7 +230,6 @@ OLD_SCENE = (
 @pytest.mark.render
 def test_scenes_that_are_named_by_file_are_found_under_the_asset_roots(tmp_path: Path) -> None:
     """As in robosuite 1.0's demonstrations, which also have lists for vectors and one picture for six faces."""
-    pytest.importorskip("lerobot.datasets")
     from robocasa_lerobot.convert.pipeline import convert
     from robocasa_lerobot.convert.verify import verify
 

@@ -15,18 +15,15 @@ import pytest
 from convert_support import SCENE, tree_hashes, write_demos
 
 from robocasa_lerobot.convert import settings
+from robocasa_lerobot.convert.pipeline import ConversionResult, convert
 from robocasa_lerobot.convert.reading.demo_file import DemoFile
 from robocasa_lerobot.convert.reading.layout import ROBOMIMIC
+from robocasa_lerobot.convert.record_files import META_FOLDER
 from robocasa_lerobot.convert.render import Scene
 from robocasa_lerobot.convert.scenes.compiled import CompiledScene
 from robocasa_lerobot.convert.scenes.demo_scene import DemoScene
 from robocasa_lerobot.convert.scenes.prefetch import ScenesAhead, SceneSource
 from robocasa_lerobot.convert.settings import Camera, ConversionSettings
-
-pytest.importorskip("lerobot.datasets")
-
-from robocasa_lerobot.convert.pipeline import ConversionResult, convert
-from robocasa_lerobot.convert.record_files import META_FOLDER
 
 SECONDS = 60
 SETTINGS = ConversionSettings(image_size=32)

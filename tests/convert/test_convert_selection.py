@@ -101,7 +101,6 @@ def test_mistakes_are_named(masked: Path, filter_key: str | None, demos: str | N
 def test_every_file_is_sampled_by_itself_and_the_record_says_which(
     masked: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    pytest.importorskip("lerobot.datasets")
     from robocasa_lerobot.convert.verify import verify
     from robocasa_lerobot.convert.writing.statistics import column
 

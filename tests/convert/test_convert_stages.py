@@ -15,18 +15,13 @@ import pyarrow.parquet as pq
 import pytest
 import torch
 from convert_support import INSTRUCTION, tree_hashes, write_demos
-
-from robocasa_lerobot import contract
-from robocasa_lerobot.errors import UserError
-from robocasa_lerobot.jsonl import read_jsonl
-
-pytest.importorskip("lerobot.datasets")
 from lerobot.datasets.aggregate import aggregate_datasets
 from lerobot.datasets.language_render import active_at
 from lerobot.datasets.lerobot_dataset import LeRobotDataset
 from lerobot.utils.collate import lerobot_collate_fn
 from lerobot.utils.feature_utils import dataset_to_policy_features
 
+from robocasa_lerobot import contract
 from robocasa_lerobot.convert.export import export
 from robocasa_lerobot.convert.pipeline import convert
 from robocasa_lerobot.convert.record_files import META_FOLDER
@@ -37,6 +32,8 @@ from robocasa_lerobot.convert.verify import verify
 from robocasa_lerobot.convert.writing.stages import SUBTASKS_FILE, read_subtasks
 from robocasa_lerobot.data.mixture import MixtureDataset
 from robocasa_lerobot.data.mixture_config import MemberConfig, MixtureConfig
+from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.jsonl import read_jsonl
 
 SETTINGS = ConversionSettings()
 # In the second episode the first stage has come undone and is carried out again; two of its stages say the same.

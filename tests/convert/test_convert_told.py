@@ -11,13 +11,11 @@ import pytest
 from convert_support import write_demos
 
 from robocasa_lerobot import cli, contract
-from robocasa_lerobot.jsonl import read_jsonl
-
-pytest.importorskip("lerobot.datasets")
 from robocasa_lerobot.convert.pipeline import convert
 from robocasa_lerobot.convert.reading.mjcf import AssetFinder, MissingAssetsError, loadable
 from robocasa_lerobot.convert.record_files import META_FOLDER
 from robocasa_lerobot.convert.settings import ConversionSettings
+from robocasa_lerobot.jsonl import read_jsonl
 
 CAMERA = contract.CAMERAS[0]
 MAPPING = """

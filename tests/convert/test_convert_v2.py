@@ -12,14 +12,9 @@ import numpy as np
 import pytest
 import v2_support as v2
 from convert_support import leftovers, tree_hashes
-
-from robocasa_lerobot import cli, contract
-from robocasa_lerobot.errors import UserError
-from robocasa_lerobot.jsonl import read_jsonl
-
-pytest.importorskip("lerobot.datasets")
 from lerobot.datasets.lerobot_dataset import LeRobotDataset
 
+from robocasa_lerobot import cli, contract
 from robocasa_lerobot.convert import pipeline
 from robocasa_lerobot.convert.lerobot_v2.plan import V2Plan
 from robocasa_lerobot.convert.pipeline import convert
@@ -28,6 +23,8 @@ from robocasa_lerobot.convert.settings import ConversionSettings, Shard
 from robocasa_lerobot.convert.verify import verify
 from robocasa_lerobot.convert.writing.statistics import column
 from robocasa_lerobot.convert.writing.video import digests, probe
+from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.jsonl import read_jsonl
 
 LENGTHS = (24, 1, 31)
 SETTINGS = ConversionSettings()

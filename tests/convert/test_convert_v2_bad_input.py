@@ -15,15 +15,13 @@ import v2_support as v2
 from convert_support import leftovers, write_demos
 
 from robocasa_lerobot import contract
-from robocasa_lerobot.errors import UserError
-from robocasa_lerobot.jsonl import read_jsonl
-
-pytest.importorskip("lerobot.datasets")
 from robocasa_lerobot.convert.pipeline import convert
 from robocasa_lerobot.convert.record_files import META_FOLDER
 from robocasa_lerobot.convert.settings import ConversionSettings
 from robocasa_lerobot.convert.verify import verify
 from robocasa_lerobot.convert.writing.video import digests
+from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.jsonl import read_jsonl
 
 CAMERA = contract.CAMERAS[0]
 LENGTHS = (24, 15, 9)

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import av
 import h5py
 import numpy as np
 import pyarrow as pa
@@ -16,16 +17,12 @@ import pytest
 from convert_support import write_demos
 
 from robocasa_lerobot import cli, contract
-from robocasa_lerobot.errors import UserError
-from robocasa_lerobot.jsonl import read_jsonl, write_jsonl
-
-pytest.importorskip("lerobot.datasets")
-import av
-
 from robocasa_lerobot.convert.pipeline import convert
 from robocasa_lerobot.convert.record_files import META_FOLDER
 from robocasa_lerobot.convert.settings import ConversionSettings
 from robocasa_lerobot.convert.verify import verify
+from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.jsonl import read_jsonl, write_jsonl
 
 CAMERA = contract.CAMERAS[1]
 

@@ -12,16 +12,13 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from convert_support import TEXTURE, moving_pictures, write_demos
-
-from robocasa_lerobot import contract
-from robocasa_lerobot.contract import Part
-
-pytest.importorskip("lerobot.datasets")
 from lerobot.datasets.aggregate import aggregate_datasets
 from lerobot.datasets.lerobot_dataset import LeRobotDataset
 from lerobot.datasets.sampler import EpisodeAwareSampler
 from torch.utils.data import DataLoader
 
+from robocasa_lerobot import contract
+from robocasa_lerobot.contract import Part
 from robocasa_lerobot.convert.pipeline import convert
 from robocasa_lerobot.convert.settings import ConversionSettings
 from robocasa_lerobot.convert.writing.dataset import DatasetWriter

@@ -16,10 +16,6 @@ from convert_support import INSTRUCTION, write_demos
 from full_disk import full_after
 
 from robocasa_lerobot import cli, contract
-from robocasa_lerobot.errors import UserError
-from robocasa_lerobot.jsonl import read_jsonl
-
-pytest.importorskip("lerobot.datasets")
 from robocasa_lerobot.convert.export import ExportSettings, export
 from robocasa_lerobot.convert.lerobot_v3 import ExportedDataset
 from robocasa_lerobot.convert.pipeline import convert
@@ -27,6 +23,8 @@ from robocasa_lerobot.convert.record_files import META_FOLDER
 from robocasa_lerobot.convert.settings import ConversionSettings
 from robocasa_lerobot.convert.verify import verify
 from robocasa_lerobot.convert.writing.statistics import column
+from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.jsonl import read_jsonl
 
 LENGTHS = (14, 1, 9)
 SETTINGS = ConversionSettings()

@@ -12,13 +12,9 @@ import mujoco
 import numpy as np
 import pytest
 from convert_support import SCENE, leftovers, tree_hashes, write_demos
-
-from robocasa_lerobot import cli, contract
-from robocasa_lerobot.errors import UserError
-
-pytest.importorskip("lerobot.datasets")
 from lerobot.datasets.lerobot_dataset import LeRobotDataset
 
+from robocasa_lerobot import cli, contract
 from robocasa_lerobot.convert.pipeline import convert
 from robocasa_lerobot.convert.reading.demo_file import RejectedEpisodeError
 from robocasa_lerobot.convert.record_files import META_FOLDER
@@ -28,6 +24,7 @@ from robocasa_lerobot.convert.rerender.plan import RenderSettings, make_render_p
 from robocasa_lerobot.convert.rerender.work import render_dataset
 from robocasa_lerobot.convert.settings import ConversionSettings
 from robocasa_lerobot.convert.verify import verify
+from robocasa_lerobot.errors import UserError
 
 ABOVE = {"above": {"parent_body": "world", "pos": [1, 0, 3], "quat": [1, 0, 0, 0], "camera_attribs": {"fovy": 70}}}
 

@@ -15,20 +15,17 @@ import pytest
 import torch
 from hypothesis import given
 from hypothesis import strategies as st
-
-from robocasa_lerobot.data.mixture_config import MemberConfig, MixtureConfig
-from robocasa_lerobot.data.sampler import FramePool, MixtureSampler, mixture_probabilities
-from robocasa_lerobot.errors import UserError
-
-pytest.importorskip("lerobot.datasets")
 from lerobot.datasets.lerobot_dataset import LeRobotDataset
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.data import mixture as mixtures
 from robocasa_lerobot.data.fake import INSTRUCTIONS, write_fake_dataset
 from robocasa_lerobot.data.mixture import MixtureDataset, StepBatches
+from robocasa_lerobot.data.mixture_config import MemberConfig, MixtureConfig
 from robocasa_lerobot.data.reading import frame_cache
 from robocasa_lerobot.data.reading.source import DatasetSource
+from robocasa_lerobot.data.sampler import FramePool, MixtureSampler, mixture_probabilities
+from robocasa_lerobot.errors import UserError
 
 WINDOWS = {
     **{key: [-0.05, 0.0] for key in (*contract.IMAGE_KEYS, contract.STATE_KEY)},

@@ -65,7 +65,6 @@ def test_replay_makes_the_same_scene_and_the_same_goal(fruits: tuple[Path, list[
 
 @pytest.mark.render
 def test_datasets_have_the_text_of_every_stage(fruits: tuple[Path, list[Any]], tmp_path: Path) -> None:
-    pytest.importorskip("lerobot.datasets")
     from lerobot.datasets.language_render import active_at
     from lerobot.datasets.lerobot_dataset import LeRobotDataset
 

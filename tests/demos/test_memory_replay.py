@@ -236,7 +236,6 @@ def test_a_file_without_terms_is_judged_by_its_states(file: Path, tmp_path: Path
 @pytest.mark.slow
 @pytest.mark.render
 def test_a_converted_dataset_still_replays(file: Path, tmp_path: Path) -> None:
-    pytest.importorskip("lerobot.datasets")
     from robocasa_lerobot.convert.export import ExportSettings, export
     from robocasa_lerobot.convert.pipeline import convert
     from robocasa_lerobot.convert.settings import ConversionSettings

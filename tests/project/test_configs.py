@@ -19,8 +19,11 @@ from robocasa_lerobot.evaluation.planning.check import check
 from robocasa_lerobot.settings import check_keys
 from robocasa_lerobot.training.config import experiment_files as overlay
 from robocasa_lerobot.training.config.experiment import FROM_SCRATCH, HUB, ExperimentConfig, load_experiment, to_yaml
-from robocasa_lerobot.training.planning import skipped
+from robocasa_lerobot.training.phases import run_experiment
+from robocasa_lerobot.training.planning import plan, plan_text, skipped
 from robocasa_lerobot.training.planning.evaluations import command_arguments, phase_evaluations
+from robocasa_lerobot.training.setup import builders, optimizers
+from robocasa_lerobot.training.weights import adapters
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 PARTS = CONFIGS / "experiments" / "parts"  # bases that are no experiments by themselves
@@ -98,8 +101,6 @@ def test_lifelong_phases_are_evaluated_on_the_tasks_so_far() -> None:
 @pytest.mark.parametrize("path", EXPERIMENTS, ids=name_of)
 def test_experiment_plans(path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Without any data, and for the published ones without the policies' weights: the plan says what is missing."""
-    plan = pytest.importorskip("robocasa_lerobot.training.planning.plan")
-    plan_text = pytest.importorskip("robocasa_lerobot.training.planning.plan_text")
     monkeypatch.chdir(tmp_path)  # there are no datasets here
     if path not in OWN:  # building pi0 takes minutes even without memory for its weights
         monkeypatch.setattr(plan, "_plan_policy", lambda *_: None)
@@ -116,9 +117,6 @@ def test_experiment_plans(path: Path, tmp_path: Path, monkeypatch: pytest.Monkey
 
 @pytest.mark.parametrize("path", OWN, ids=name_of)
 def test_policies_of_our_own_experiments_build(path: Path) -> None:
-    builders = pytest.importorskip("robocasa_lerobot.training.setup.builders")
-    adapters = pytest.importorskip("robocasa_lerobot.training.weights.adapters")
-    optimizers = pytest.importorskip("robocasa_lerobot.training.setup.optimizers")
     from robocasa_lerobot.data.mixture import MixtureMeta
 
     experiment = load_experiment(path)
@@ -197,10 +195,9 @@ def all_datasets(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_experiment_runs_two_steps_of_each_phase(
     path: Path, tmp_path: Path, all_datasets: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    phases = pytest.importorskip("robocasa_lerobot.training.phases")
     monkeypatch.chdir(all_datasets)
     experiment = shrunk(load_experiment(path), tmp_path / "out")
-    assert phases.run_experiment(experiment)
+    assert run_experiment(experiment)
     left_out = {item.phase for item in skipped.read(tmp_path / "out") if item.kind == skipped.PHASE}
     assert (path.parent.name == "small") or not left_out
     for phase in experiment.phases:

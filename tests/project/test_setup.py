@@ -118,3 +118,16 @@ def test_help_lists_every_target() -> None:
     assert phony is not None
     for target in phony[1].split():
         assert f"make {target} " in done.stdout
+
+
+def test_what_is_always_installed_is_never_skipped() -> None:
+    """A module of ours, or of what we stand on, that does not import is a failure, no reason to leave tests out."""
+    names = {Requirement(line).name.replace("-", "_") for line in PROJECT["project"]["dependencies"]}
+    skipping = re.compile(r"""importorskip\(\s*["'](\w+)""")
+    found = {
+        f"{path.relative_to(REPOSITORY)}: {name}"
+        for path in (REPOSITORY / "tests").rglob("*.py")
+        for name in skipping.findall(path.read_text(encoding="utf-8"))
+        if name in names | {"robocasa_lerobot"}
+    }
+    assert not found
