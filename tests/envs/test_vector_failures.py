@@ -83,10 +83,9 @@ def test_a_worker_that_is_killed_from_outside(when: str) -> None:
             envs.step_async(STILL)
             time.sleep(0.1)
         os.kill(envs.processes[1].pid, signal.SIGKILL)
-        started = time.monotonic()
         with pytest.raises(WorkerError, match="SIGKILL") as caught:
             envs.step_wait() if when == "busy" else envs.step(STILL)
-        assert time.monotonic() - started < 60  # not the 300 s after which it would count as hanging
+        assert "gave no answer" not in str(caught.value)  # it did not have to count as hanging first
         assert (caught.value.index, caught.value.progress.seed) == (1, 21)
 
 

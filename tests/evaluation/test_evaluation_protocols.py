@@ -154,28 +154,26 @@ def test_lifelong_policies_run_the_tasks_of_their_phases(monkeypatch: pytest.Mon
 
 
 def test_perturbations_share_seeds_and_have_their_sigmas_in_the_header() -> None:
-    config = protocol(
-        "robustness", "--env.task_sets=[]", "--env.tasks=OpenDrawer", "--trials=3", "--perturbation.joint_rad=0.3"
-    )
+    # Each another one than its default, and than the others.
+    camera = {"camera_position_m": 0.2, "camera_angle_deg": 7.0, "wrist_position_m": 0.01, "wrist_angle_deg": 1.5}
+    joint, base = {"joint_rad": 0.3}, {"base_position_m": 0.4, "base_yaw_deg": 20.0}
+    settings = [f"--perturbation.{name}={value}" for name, value in {**camera, **joint, **base}.items()]
+    config = protocol("robustness", "--env.task_sets=[]", "--env.tasks=OpenDrawer", "--trials=3", *settings)
     evaluation = engine.prepare(config)
     assert len(evaluation.plan) == 3 * len(PERTURBATIONS)
     by_trial: dict[int, set[tuple[int, int]]] = {}
     for spec in evaluation.plan:
         by_trial.setdefault(spec.trial, set()).add((spec.seed, spec.policy_seed))
     assert [len(seeds) for seeds in by_trial.values()] == [1, 1, 1]
-    assert evaluation.header.perturbations["joint"] == {"joint_rad": 0.3}
-    assert set(evaluation.header.perturbations["camera"]) == {
-        "camera_position_m",
-        "camera_angle_deg",
-        "wrist_position_m",
-        "wrist_angle_deg",
-    }
+    sigmas = {"camera": camera, "joint": joint, "base": base}
+    assert {name: evaluation.header.perturbations[name] for name in sigmas} == sigmas
     arguments: dict[str, dict[str, Any]] = {n: env_arguments(n, config.perturbation) for n in PERTURBATIONS}
     assert arguments["none"] == {}
     assert arguments["language"] == {"novel_language": True}
     assert arguments["joint"] == {"initial_noise": InitialNoise(arm_rad=0.3)}
-    assert arguments["base"] == {"initial_noise": InitialNoise(base_position_m=0.1, base_yaw_deg=10.0)}
-    assert arguments["camera"] == {"camera_noise": CameraNoise()}
+    assert arguments["base"] == {"initial_noise": InitialNoise(base_position_m=0.4, base_yaw_deg=20.0)}
+    noise = CameraNoise(scene_position_m=0.2, scene_angle_deg=7.0, wrist_position_m=0.01, wrist_angle_deg=1.5)
+    assert arguments["camera"] == {"camera_noise": noise}
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,8 @@ from typing import Any
 import numpy as np
 import pytest
 import torch
-from accelerate import Accelerator
+from accelerate import Accelerator, tracking
+from accelerate.utils import LoggerType
 from training_support import ROOT, experiment_file, losses, metrics, tiny
 
 from robocasa_lerobot import contract
@@ -275,18 +276,48 @@ def test_tracker_without_its_package_is_told(
 @pytest.mark.costly
 @pytest.mark.parametrize("tracker", TRACKERS)
 def test_trackers_get_the_metrics(tmp_path: Path, data: Path, monkeypatch: pytest.MonkeyPatch, tracker: str) -> None:
-    pytest.importorskip(tracker)
-    from accelerate import Accelerator
+    """Accelerate hands them to a class of the tracker's name, which stands in for one that would send them."""
+    got: list[tuple[str, Any]] = []
+    known_as, real = tracker, tracking.LOGGER_TYPE_TO_CLASS[tracker]
 
-    sent: list[dict[str, Any]] = []
-    monkeypatch.setattr(Accelerator, "log", lambda _, values, step=None, **__: sent.append({**values, "step": step}))
-    monkeypatch.chdir(tmp_path)
+    class Noting(tracking.GeneralTracker):
+        name, requires_logging_directory = known_as, real.requires_logging_directory
+        main_process_only = True
+
+        def __init__(self, run_name: str, *folder: str) -> None:
+            super().__init__()
+            got.append(("run", run_name))
+
+        @property
+        def tracker(self) -> None:
+            return None
+
+        def store_init_configuration(self, values: dict[str, Any]) -> None:
+            got.append(("settings", values))
+
+        def log(self, values: dict[str, Any], step: int | None = None, **kwargs: Any) -> None:
+            got.append(("line", {**values, "step": step}))
+
+        def finish(self) -> None:
+            got.append(("end", None))
+
+    monkeypatch.setitem(tracking.LOGGER_TYPE_TO_CLASS, tracker, Noting)
+    monkeypatch.setattr(tracking, "_available_trackers", [LoggerType(tracker)])
     run_experiment(tiny(tmp_path, data, overrides=[f"--trackers=[{tracker}]"]), stop_after=6)
+    kinds = [kind for kind, _ in got]
+    assert kinds == ["run", "settings", *["line"] * 6, "end"]
+    assert got[0][1] == "test"
+    settings = got[1][1]
+    assert settings["seed"] == 0
+    assert json.loads(settings["policy"])["type"] == "diffusion_transformer"
+    sent = [value for kind, value in got if kind == "line"]
     # Steps that begin again would be dropped by wandb.
     assert [values["step"] for values in sent] == [1, 2, 3, 4, 5, 6]
-    assert sent[1]["pretrain/loss"] == metrics(tmp_path, "pretrain")[1]["loss"]
-    assert sent[5]["finetune/loss"] == metrics(tmp_path, "finetune")[1]["loss"]
-    assert sent[5]["finetune/step"] == 2
+    for phase, lines in (("pretrain", sent[:4]), ("finetune", sent[4:])):
+        for values, line in zip(lines, metrics(tmp_path, phase), strict=True):
+            numbers = {f"{phase}/{key}": value for key, value in line.items() if isinstance(value, int | float)}
+            assert {name: value for name, value in values.items() if name != "step"} == numbers
+            assert {f"{phase}/loss", f"{phase}/step", f"{phase}/grad_norm"} <= numbers.keys()
 
 
 def test_shared_noise_is_that_of_one_process() -> None:
