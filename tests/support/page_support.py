@@ -17,6 +17,7 @@ import mujoco
 import numpy as np
 from browser import Browser, find_chromium
 from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt
 from teleop_support import WAIT_S, served
 
 from robocasa_lerobot.envs.robots.panda_omron.names import GRIP_SITE
@@ -174,3 +175,11 @@ def driven_page(settings: TeleopSettings, policy: str = "", **window: Any) -> It
         page.until("ready")
         yield page
         line.close()
+
+
+def middle_of(seen: NDArray[np.bool_]) -> tuple[int, int]:
+    """Row and column that are farthest from what is not `seen`."""
+    depth = distance_transform_edt(np.pad(seen, 1))[1:-1, 1:-1]
+    row, column = np.unravel_index(int(depth.argmax()), seen.shape)
+    assert depth[row, column] > 2, "too little of it is to be seen"
+    return int(row), int(column)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+import json
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -9,10 +11,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from browser import Browser, find_chromium
-from page_support import Page, driven_page
+from page_support import Page, driven_page, middle_of
 from teleop_support import served, settings
 
 from robocasa_lerobot.demos.motion import base_pose
+from robocasa_lerobot.envs.rendering import SceneRenderer
 from robocasa_lerobot.teleop.client import TeleopClient
 
 pytestmark = [
@@ -302,14 +305,28 @@ def test_a_click_on_the_map_drives_there(page: Page) -> None:
 
 
 def test_a_click_in_a_picture_asks_for_what_is_there(page: Page) -> None:
-    left, top, width, height = page.browser.box("[data-camera=robot0_agentview_right] canvas")
-    for kind in ("mousePressed", "mouseReleased"):
-        page.browser.mouse(kind, left + 0.5 * width, top + 0.5 * height)
-    # Depending on what the kitchen has there: it reaches, or says why not.
-    said = page.browser.until(
-        "[...document.querySelectorAll('#notes p')].map(p => p.textContent).find(t => /above|itself/.test(t))"
-    )
-    assert "above" in said or "the robot itself" in said
+    """One place that shows the robot, and one that shows something else: each has its own answer."""
+    camera, env = "robot0_agentview_right", page.session.env
+    renderer = SceneRenderer(env.model, 64, 64)
+    try:
+        geoms = renderer.geometry(copy.copy(env.data), camera)[1]
+    finally:
+        renderer.close()
+    bodies = env.model.geom_bodyid[geoms]
+    robot = env.scene.subtree(env.robot.names.base)[bodies] & (geoms >= 0)
+    loose = np.any([env.scene.subtree(name)[bodies] for name in env.scene.objects] or [robot], axis=0)
+    left, top, width, height = page.browser.box(f"[data-camera={camera}] canvas")
+    answers = "[...document.querySelectorAll('#notes p')].map(p => p.textContent).filter(t => /above|itself/.test(t))"
+    before = page.browser.ask(f"{answers}.at(-1)")
+    for seen in (robot, ~robot & ~loose & (geoms >= 0)):
+        row, column = middle_of(seen)
+        root = env.model.body(int(env.model.body_rootid[bodies[row, column]])).name
+        for kind in ("mousePressed", "mouseReleased"):
+            page.browser.mouse(kind, left + (column + 0.5) / 64 * width, top + (row + 0.5) / 64 * height)
+        expected = "that is the robot itself" if seen is robot else f"reaching above {root}"
+        said = page.browser.until(f"{answers}.at(-1) !== {json.dumps(before)} && {answers}.at(-1)")
+        assert said == expected
+        before = said
     page.hold("KeyR", 2)  # any input ends it
     page.browser.until("!document.querySelector('#stop-assist').checkVisibility()")
 
