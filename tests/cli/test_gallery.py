@@ -53,6 +53,39 @@ def test_sections_are_filtered() -> None:
         list(tiles_of("layout"))
 
 
+@pytest.mark.render
+def test_the_command_draws_starts_as_they_are_asked_for(tmp_path, capsys) -> None:
+    asked = ["--tasks=OpenDrawer", "--seeds=1", "--image-size=48", "--overview-size=64x32"]
+    written = {}
+    for preset, form in (("fast", "png"), ("quality", "jpg")):
+        out = tmp_path / preset
+        assert main(["gallery", *asked, f"--preset={preset}", f"--format={form}", f"--out={out}"]) == 0
+        paths = capsys.readouterr().out.split()
+        assert sorted(paths) == sorted(str(path) for path in out.rglob("*.*"))
+        assert {path.rpartition(".")[2] for path in paths} == {form}
+        written[preset] = [Image.open(path) for path in paths]
+        assert {picture.format for picture in written[preset]} == {{"png": "PNG", "jpg": "JPEG"}[form]}
+        assert [picture.size for picture in written[preset]] == [(3 * 48, 48), (64, 32)]
+    fast, quality = (np.asarray(written[preset][0].convert("RGB"), float) for preset in ("fast", "quality"))
+    assert np.abs(fast - quality).mean() > 3, "the presets draw alike"
+
+
+@pytest.mark.render
+def test_the_command_makes_sheets_and_a_page_of_sections(tmp_path, capsys) -> None:
+    options = ["--show=layouts,appliances", "--split=target", "--category=galley,toaster"]
+    assert main(["gallery", *options, f"--out={tmp_path}"]) == 0
+    paths = capsys.readouterr().out.split()
+    assert sorted(paths) == sorted(str(path) for path in tmp_path.iterdir())
+    page = (tmp_path / "gallery.html").read_text()
+    assert "layout 5: galley" in page
+    assert 'data-category="toaster" data-split=target' in page
+    assert "data-split=pretrain" not in page
+    sheets = {path.rpartition("/")[2].partition("_")[0].partition(".")[0] for path in paths}
+    assert {"layouts", "appliances"} <= sheets
+    for path in paths:
+        assert path.endswith(".html") or np.asarray(Image.open(path)).std() > 20
+
+
 @pytest.mark.parametrize(
     ("options", "words"),
     [
