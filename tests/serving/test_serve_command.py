@@ -18,14 +18,18 @@ from typing import Any
 
 import numpy as np
 import pytest
+from gr00t_client import GrootClient
 from websockets.asyncio.client import connect as connect_async
 from websockets.asyncio.server import ServerConnection
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
-from robocasa_lerobot import cli
+from robocasa_lerobot import cli, contract
+from robocasa_lerobot.serving import server
 from robocasa_lerobot.serving.access import Access
+from robocasa_lerobot.serving.host import Host
 from robocasa_lerobot.serving.limits import Limits
+from robocasa_lerobot.serving.server import ServerSettings
 from robocasa_lerobot.serving.web import serve_websockets
 from robocasa_lerobot.wire.codec import decode, encode
 
@@ -56,6 +60,60 @@ def test_it_answers_and_ends_cleanly_with_a_client_connected(how: signal.Signals
         process.send_signal(how)
         assert process.wait(30) == 0
         assert "the server has ended" in process.stdout.read()  # type: ignore[union-attr]
+
+
+def test_it_speaks_vla_eval() -> None:
+    with command("--protocol=vla_eval") as (process, port):
+        with connect(f"ws://127.0.0.1:{port}", compression=None) as connection:
+            hello = {"type": "hello", "payload": {"protocol_version": 1}, "seq": 1, "timestamp": 0.0}
+            connection.send(encode(hello, "vla_eval"))
+            answer = decode(connection.recv(timeout=30))
+            assert (answer["type"], answer["seq"]) == ("hello", 1)
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(30) == 0
+
+
+@pytest.mark.parametrize(("options", "prefix"), [(["--groot-version=1.5", "--allow-kill"], "state."), ([], "")])
+def test_it_speaks_gr00t_and_its_clients_may_end_it_where_they_are_allowed_to(options: list[str], prefix: str) -> None:
+    with command("--protocol=gr00t", *options) as (process, port):
+        client = GrootClient(port)
+        keys = client.call("get_modality_config")["state"]["modality_keys"]
+        assert keys == [prefix + part.name for part in contract.STATE_PARTS]
+        answer = client.call("kill")
+        if options:
+            assert answer["status"] == "ok"
+        else:
+            assert "--allow-kill" in answer["error"]
+            assert client.call("ping")["status"] == "ok"
+            process.send_signal(signal.SIGTERM)
+        client.close()
+        assert process.wait(30) == 0
+
+
+def test_each_option_reaches_the_policy_and_its_server(checkpoint: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    import torch
+
+    made: list[tuple[Host, ServerSettings]] = []
+    monkeypatch.setattr(server, "run_server", lambda host, settings, _: made.append((host, settings)) or host.close())
+    threads = torch.get_num_threads()
+    given = ["--policy.threads=2", "--policy.batch_width=3", "--policy.label=mine", "--executed-steps=5", "--seed=4"]
+    given += ["--resize", "--protocol=gr00t", "--groot-version=1.5", "--allow-kill"]
+    given += ["--max-message=2", "--max-clients=7", "--port=9"]
+    try:
+        assert cli.main(["serve", f"--policy.path={checkpoint}"]) == 0
+        assert torch.get_num_threads() == 1
+        assert cli.main(["serve", f"--policy.path={checkpoint}", *given]) == 0
+        assert torch.get_num_threads() == 2
+        assert cli.main(["serve", f"--policy.path={checkpoint}", "--repeat-history"]) == 0
+    finally:
+        torch.set_num_threads(threads)
+    (usual, _), (host, settings), (repeating, _) = made
+    wanted = [(one.wanted.resize, one.wanted.repeat) for one in (usual, host, repeating)]
+    assert wanted == [(False, False), (True, False), (False, True)]
+    assert (host.served.source.label, host.served.executed, host.served.width, host._seed) == ("mine", 5, 3, 4)
+    assert (usual.served.executed, usual._seed) == (8, 0)
+    access, limits = Access("127.0.0.1", 9, None), Limits(2 * 2**20, 7)
+    assert settings == ServerSettings("gr00t", access, limits, groot_version="1.5", allow_kill=True)
 
 
 def test_the_token_is_asked_for_everywhere_but_for_health(tmp_path: Path) -> None:
