@@ -94,7 +94,9 @@ def run(args: argparse.Namespace) -> int:
     for warning in result.warnings:
         print(f"warning: {warning}")
     for source, count in result.instruction_sources.items():
-        if source != "ep_meta.lang" and not source.startswith("tasks.jsonl"):
+        if args.replace_instruction:
+            print(f"{count} episodes have the instruction that was given, whatever they record")
+        elif source != "ep_meta.lang" and not source.startswith("tasks.jsonl"):
             print(f"{count} episodes record no instruction; theirs is taken from: {source}")
     if result.rejected:
         print(f"{len(result.rejected)} episodes rejected (all in meta/robocasa/rejected.jsonl):")
