@@ -191,6 +191,11 @@ def test_a_file_is_prepared_and_what_was_recorded_stays(
     ahead = np.linalg.norm(found.target[:, :3, 3] - found.eef[:, :3, 3], axis=1)
     assert ahead.max() < 0.05 * np.sqrt(3) + 1e-3
     assert list(prepare_files([path])) == list(prepare_files([path]))  # done already
+    for words, again in (([], False), (["--fresh"], True)):  # a file that is prepared takes the other one's place
+        written = path.stat().st_ino
+        assert cli.main(["prepare", str(path), "--workers", "1", *words]) == 0
+        assert (path.stat().st_ino != written) == again
+    assert _arrays(path) == before
     (tmp_path / ".CloseDrawer.prepare").mkdir()  # a run was killed when it had replaced the file
     assert len(list(prepare_files([path]))) == 2
     assert [one.name for one in tmp_path.iterdir()] == ["CloseDrawer.hdf5"]
