@@ -12,7 +12,7 @@ import synthetic_runs
 
 from robocasa_lerobot.cli import main
 from robocasa_lerobot.evaluation.leaderboard import protocol
-from robocasa_lerobot.evaluation.leaderboard.submission import overall, problems
+from robocasa_lerobot.evaluation.leaderboard.submission import SubmissionFacts, overall, problems
 from robocasa_lerobot.evaluation.records.results import RunHeader, TrialRecord
 from robocasa_lerobot.evaluation.report.gather import gather
 from robocasa_lerobot.policies.origin import Origin
@@ -57,6 +57,24 @@ def test_a_run_by_the_protocol_becomes_a_submission(
     assert "not RoboCasa's simulator" in values["robocasa_version"]
     assert (values["submission_source"], values["open_source"], values["paper_link"]) == ("external", "yes", "N/A")
     assert f"overall {overall(values)} %" in capsys.readouterr().out
+    assert main(["leaderboard", "--check", str(out)]) == 0
+
+
+def test_each_fact_that_is_given_stands_in_the_submission(good: Path, tmp_path: Path) -> None:
+    out = tmp_path / "submission.json"
+    asked = {
+        "model_name": "Test", "policy_family": "VLA", "date": "2026-01-31", "submission_source": "internal",
+        "open_source": "no", "code_url": "https://example.org/code", "checkpoint_url": "https://example.org/weights",
+        "paper_link": "https://example.org/paper", "commit_hash": "0123abc", "wandb": "https://example.org/runs",
+        "batch_size": 64, "num_training_steps": 9, "notes": "Eight GPUs.",
+    }  # fmt: skip
+    assert asked.keys() == {field.name for field in dataclasses.fields(SubmissionFacts)}
+    words = [f"--{name.replace('_', '-')}={value}" for name, value in asked.items()]
+    assert main(["leaderboard", str(good), "-o", str(out), *words]) == 0
+    values = json.loads(out.read_text())
+    assert values["notes"].startswith("Eight GPUs. ")
+    found = {**values, **values["training_config"]}
+    assert {name: found[name] for name in asked} == {**asked, "notes": values["notes"]}
     assert main(["leaderboard", "--check", str(out)]) == 0
 
 

@@ -39,6 +39,27 @@ def test_gpus_are_asked_for(ray: StandIn, tmp_path: Path) -> None:
     assert ray.asked[-1]["num_gpus"] == 2
 
 
+@pytest.mark.parametrize(("words", "at_a_time"), [(["--ray.jobs=2"], [2, 2, 2, 2, 1]), ([], [5, 4, 3, 2, 1])])
+def test_no_more_pieces_run_at_a_time_than_were_asked_for(
+    ray: StandIn, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: list[str], at_a_time: list[int]
+) -> None:
+    parser = argparse.ArgumentParser()
+    add_options(parser)
+    found: list[int] = []
+    wait = ray.wait
+
+    def counted(references: Any, num_returns: int) -> Any:
+        found.append(len(references))
+        return wait(references, num_returns)
+
+    monkeypatch.setattr(ray, "wait", counted)
+    execution = execution_of(parser.parse_args(["--executor=ray", *words], argparse.Namespace(workers=None)))
+    step = Ran()
+    run_with_ray(step, 5, tmp_path, execution.ray)
+    assert step.ranks == [0, 1, 2, 3, 4]
+    assert found == at_a_time
+
+
 def test_pieces_run_in_the_folder_of_the_command(ray: StandIn, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     found: list[Path] = []

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import argparse
+import dataclasses
 import json
 import os
 import pickle
+import re
 import subprocess
 import sys
 from functools import partial
@@ -13,7 +16,7 @@ from pathlib import Path
 import pytest
 
 from robocasa_lerobot.errors import UserError
-from robocasa_lerobot.jobs.executors import JOBS_FILE, SlurmSettings, submit_to_slurm
+from robocasa_lerobot.jobs.executors import JOBS_FILE, SlurmSettings, add_options, execution_of, submit_to_slurm
 
 TAKES = """#!/bin/bash
 cp "${{@: -1}}" {script}
@@ -56,6 +59,34 @@ def test_each_array_that_was_taken_is_noted_at_once(tmp_path: Path, monkeypatch:
     script = (tmp_path / "script").read_text()  # of the last one, which waits for all arrays
     assert "--dependency=afterok:1:2\n" in script
     assert "srun --cpus-per-task=2 " in (tmp_path / "work" / "launch_script.slurm").read_text()
+
+
+def test_each_option_is_in_what_slurm_is_asked_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PATH", f"{tmp_path}{os.pathsep}{os.environ['PATH']}")
+    takes(tmp_path, 9)
+    asked = {
+        "partition": "gpu", "time": "2:00", "jobs": 3, "cpus": 5, "mem_per_cpu_gb": 7, "gpus": 2, "account": "kitchens",
+        "qos": "long", "env_command": "module load mesa", "max_array_size": 9,
+    }  # fmt: skip
+    parser = argparse.ArgumentParser()
+    add_options(parser)
+    words = ["--executor=slurm", *(f"--slurm.{name}={value}" for name, value in asked.items())]
+    execution = execution_of(parser.parse_args(words, argparse.Namespace(workers=None)))
+    assert execution.slurm == SlurmSettings(**asked)
+    assert {field.name for field in dataclasses.fields(SlurmSettings)} == asked.keys()
+    submit_to_slurm(print, os.getpid, 4, tmp_path / "work", tmp_path / "logs", execution.slurm)
+    array = (tmp_path / "work" / "launch_script.slurm").read_text()
+    last = (tmp_path / "script").read_text()
+    for line in (
+        "#SBATCH --partition=gpu", "#SBATCH --time=2:00", "#SBATCH --cpus-per-task=5", "#SBATCH --mem-per-cpu=7G",
+        "#SBATCH --account=kitchens", "#SBATCH --qos=long", "module load mesa",
+    ):  # fmt: skip
+        assert f"{line}\n" in array
+        assert f"{line}\n" in last
+    assert "#SBATCH --array=0-3%3\n" in array
+    assert re.findall(r"#SBATCH --gpus\S*=(\d+)", array) == ["2"]
+    assert "--gpus" not in last  # it only joins
+    assert "export PATH=" not in array
 
 
 @pytest.mark.parametrize("name", ["a&b", "a b", "100%", "it's", "$HOME"])
