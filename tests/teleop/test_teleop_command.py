@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -20,7 +21,11 @@ from teleop_support import SEED, SPLIT, TASK, WAIT_S, demonstration, drive
 
 from robocasa_lerobot import cli, gl
 from robocasa_lerobot.demos.replay import replay
+from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.teleop import run as teleop_run
 from robocasa_lerobot.teleop.client import TeleopClient
+from robocasa_lerobot.teleop.run import Place
+from robocasa_lerobot.teleop.settings import TeleopSettings
 
 pytestmark = pytest.mark.render
 
@@ -77,7 +82,7 @@ def save_one(client: TeleopClient, seed: int) -> None:
 
 @pytest.mark.costly
 def test_ctrl_c_keeps_what_is_saved(tmp_path: Path) -> None:
-    with command(tmp_path, "--episodes", "3") as running:
+    with command(tmp_path, "--episodes", "3", "--operator", "Ada", "--hide-goal") as running:
         assert re.fullmatch(r"http://127\.0\.0\.1:\d+/\?t=[\w-]{20,}", running.address)
         port = running.address.split(":")[2].split("/")[0]
         assert f"ssh -L {port}:127.0.0.1:{port}" in running.printed
@@ -87,12 +92,14 @@ def test_ctrl_c_keeps_what_is_saved(tmp_path: Path) -> None:
             client.send("clock", clock="free")
             client.send("start")
             client.until(lambda: client.frame["step"] > 3)
+            assert not client.frame["terms"]
             status, printed = running.end(signal.SIGINT)
     assert status == 1
     assert f"1 of 3 episodes in {tmp_path / (TASK + '.hdf5')}" in printed
     assert "Traceback" not in printed
     with h5py.File(tmp_path / f"{TASK}.hdf5") as file:
         assert list(file["data"]) == ["demo_0"]
+        assert "Ada" in file["data/demo_0"].attrs["ep_meta"]
 
 
 @pytest.mark.slow
@@ -121,6 +128,32 @@ def test_a_killed_session_goes_on_with_the_same_command(tmp_path: Path) -> None:
     with command(tmp_path, "--episodes", "2") as running:  # nothing is left to do
         running.process.communicate(timeout=WAIT_S)
         assert running.process.returncode == 0
+
+
+def test_every_option_reaches_the_session(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    calls: list[tuple[Any, ...]] = []
+
+    def note(settings: TeleopSettings, place: Place, _: object, **others: Any) -> None:
+        calls.append((settings, place, others))
+        raise UserError("as far as this test goes")
+
+    monkeypatch.setattr(teleop_run, "run_session", note)
+    given = {
+        "split": "pretrain", "episodes": 3, "seed": 7, "image-size": 48, "preset": "quality", "operator": "Ada",
+        "layout": 4, "style": 5, "host": "::1", "port": 9, "policy": "zero", "policy-keys": "mine", "device": "cpu",
+    }  # fmt: skip
+    words = [f"--{name}={value}" for name, value in given.items()]
+    line = ["teleop", "--task", TASK, "--out", str(tmp_path)]
+    assert cli.main([*line, *words, "--hide-goal", "--free-view"]) == 2
+    assert cli.main(line) == 2
+    (settings, place, others), (usual, usual_place, usual_others) = calls
+    assert settings == TeleopSettings(
+        TASK, tmp_path, "pretrain", 3, 7, (4,), (5,), 48, "quality", operator="Ada", hide_goal=True
+    )
+    assert place == Place("::1", 9)
+    assert others == {"policy": "zero", "device": "cpu", "keys": "mine", "free_view": True}
+    assert (usual, usual_place) == (TeleopSettings(TASK, tmp_path), Place("127.0.0.1", 8765))
+    assert usual_others == {"policy": "", "device": "auto", "keys": "", "free_view": False}
 
 
 def test_mistakes_are_told_in_a_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
