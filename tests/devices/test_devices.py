@@ -19,6 +19,7 @@ from lerobot.robots.utils import make_robot_from_config
 from lerobot.scripts import lerobot_record
 from lerobot.teleoperators.config import TeleoperatorConfig
 from lerobot.teleoperators.keyboard import teleop_keyboard
+from lerobot.teleoperators.phone.config_phone import PhoneConfig, PhoneOS
 from lerobot.teleoperators.utils import make_teleoperator_from_config
 from scipy.spatial.transform import Rotation
 
@@ -127,6 +128,23 @@ def test_announcements_bring_the_kitchen_of_their_number(robot: RobocasaKitchen)
 
 
 @pytest.mark.render
+def test_all_episodes_are_in_the_first_kitchen_where_that_is_asked_for(
+    robot: RobocasaKitchen, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(robot.config, "next_kitchen", False)
+    logging.getLogger().setLevel(logging.INFO)
+    robot._episode = 0
+    robot._reset()
+    first = robot.get_observation()
+    for number in (0, 1, 4):
+        logging.info(f"{BEGIN}{number}")
+        begun = robot.get_observation()
+        assert all(np.array_equal(begun[key], first[key]) for key in first)
+        robot.send_action(dict.fromkeys(NAMES, 0.5))
+        assert robot.get_observation()["eef_z"] != first["eef_z"]
+
+
+@pytest.mark.render
 def test_a_hurried_sender_gets_twenty_steps_a_second(robot: RobocasaKitchen) -> None:
     still = dict.fromkeys(NAMES, 0.0)
     robot.config.realtime = True
@@ -220,6 +238,10 @@ def test_lerobots_gamepad_leads_the_hand() -> None:
     said = hand.get_action()
     assert list(said) == list(NAMES) == list(hand.action_features)
     assert (said["eef_dx"], said["eef_dy"], said["gripper_close"], said["control_mode"]) == (0.5, -0.25, 1, -1)
+    assert not hand.device.config.hidapi_fallback
+    other = make_teleoperator_from_config(RobocasaHandConfig(hidapi_fallback=True))
+    assert isinstance(other, RobocasaHand)
+    assert other.device.config.hidapi_fallback
 
 
 class Key(enum.Enum):
@@ -258,11 +280,17 @@ def test_keys_that_are_let_go_say_nothing(monkeypatch: pytest.MonkeyPatch) -> No
     assert hand.get_action()["gripper_close"] == -1
 
 
-def test_a_phone_is_read_as_lerobot_reads_it() -> None:
-    step, translator = _phone_step(RobocasaHandConfig(device="phone")), HandTranslator()
+@pytest.mark.parametrize("system", PhoneOS)
+def test_a_phone_is_read_as_lerobot_reads_it(system: PhoneOS) -> None:
+    """Each kind has its own buttons for the gripper."""
+    config = RobocasaHandConfig(device="phone", phone_os=system)
+    assert config.of_device() == PhoneConfig(phone_os=system)
+    step, translator = _phone_step(config), HandTranslator()
 
     def said(x: float, button: str = "") -> dict[str, float]:
         inputs = {"reservedButtonA": button == "A", "reservedButtonB": button == "B"}
+        if system is PhoneOS.IOS:
+            inputs = {"a3": {"": 0.0, "A": 1.0, "B": -1.0}[button], "reservedButtonA": button == "B"}
         pose = {"phone.pos": np.array([0.0, -x, 0.0]), "phone.rot": Rotation.identity()}
         return translator.action(step.action({**pose, "phone.raw_inputs": inputs, "phone.enabled": True}))
 

@@ -129,6 +129,34 @@ def test_masks() -> None:
         assert [not blocked for blocked in memory[i]] == [i >= j - 1 for j in range(conditions)]
 
 
+@pytest.mark.parametrize("share", [0.0, 0.5])
+def test_dropout_of_embeddings_is_of_training_alone(share: float) -> None:
+    config = tiny_config(dropout=0.0, dropout_embedding=share)
+    net = build(config)[0].denoiser
+    times, features = torch.tensor([3]), torch.randn(1, config.n_obs_steps, net.embed_observation.in_features)
+    x = torch.randn(1, config.horizon, contract.ACTION_SIZE)
+    for training in (True, False):
+        net.train(training)
+        assert torch.equal(net.condition(times, features), net.condition(times, features)) == (
+            not training or not share
+        )
+        assert torch.equal(net(x, times, features), net(x, times, features)) == (not training or not share)
+
+
+def test_encoders_decay_and_rates_go_as_they_are_asked_to() -> None:
+    config = tiny_config(optimizer_encoder_weight_decay=0.25, scheduler_name="constant_with_warmup")
+    policy = build(config)[0]
+    encoder = {id(parameter) for parameter in policy.observation_encoder.parameters() if parameter.requires_grad}
+    decays = {group.get("weight_decay"): {id(one) for one in group["params"]} for group in policy.get_optim_params()}
+    assert decays[0.25] == encoder
+    assert not encoder & (decays[None] | decays[0.0])
+    for name, last in (("constant_with_warmup", 1.0), ("cosine", 0.0)):
+        optimizer = torch.optim.SGD([nn.Parameter(torch.zeros(1))], lr=1.0)
+        preset = tiny_config(scheduler_name=name, scheduler_warmup_steps=2).get_scheduler_preset()
+        rate = preset.build(optimizer, 10).lr_lambdas[0]
+        assert [rate(1), rate(2), rate(10)] == pytest.approx([0.5, 1.0, last])
+
+
 @pytest.mark.parametrize("n_obs_steps", [1, 2, 3])
 def test_actions_see_neither_later_actions_nor_later_observations(n_obs_steps: int) -> None:
     torch.manual_seed(0)

@@ -35,6 +35,19 @@ def test_pretrained_variant_trains_and_predicts(pretrained: Path, time_condition
     check_variant(pretrained_config(pretrained, time_conditioning=time_conditioning))
 
 
+def test_instructions_are_cut_to_so_many_tokens(pretrained: Path) -> None:
+    tokens = {}
+    for most in (48, 2):
+        config = pretrained_config(pretrained, max_tokens=most)
+        policy, preprocess, _ = build(config)
+        batch = preprocess(batch_for(config))
+        tokens[most] = batch[OBS_LANGUAGE_TOKENS]
+        assert tokens[most].shape == batch[OBS_LANGUAGE_ATTENTION_MASK].shape == (4, most)
+        assert torch.isfinite(policy(batch)[0])
+    assert batch[OBS_LANGUAGE_ATTENTION_MASK].all()
+    assert torch.equal(tokens[2], tokens[48][:, :2])
+
+
 def test_attention_mask_has_three_blocks() -> None:
     prefix = torch.tensor([[True, True, True], [True, True, False]])
     mask = attention_mask(prefix, actions=2)

@@ -71,6 +71,20 @@ def test_plan_counts_frames_once_that_phases_share(tmp_path: Path, data: Path) -
     assert "\ndisk: 5.0 GB" in render_plan(experiment, large, "cpu")
 
 
+@pytest.mark.parametrize(("budget", "cached"), [(0.0008, False), (0.0009, True)])
+def test_frames_are_cached_where_the_budget_has_room_for_them(
+    tmp_path: Path, data: Path, budget: float, cached: bool
+) -> None:
+    """96 frames of three pictures of 32 pixels, each of three bytes, are 0.00088 GB."""
+    overrides = [f"--loader.cache_budget_gb={budget}", f"--loader.cache_dir={tmp_path / 'frames'}"]
+    experiment = tiny(tmp_path, data, overrides=overrides)
+    (plan,) = plan_experiment(experiment, "pretrain", measured_steps=0)
+    assert sum(plan.cached.values()) == (884_736 if cached else 0)
+    prepare_phase(experiment, experiment.phases[0], "cpu", Accelerator(cpu=True))
+    kept = sum(path.stat().st_size for path in (tmp_path / "frames").rglob("*") if path.is_file())
+    assert (kept >= 884_736) == cached
+
+
 @pytest.mark.parametrize("lora", [None, {"rank": 2}])
 def test_plan_counts_the_float32_weights_of_a_policy_in_half_precision(
     tmp_path: Path, data: Path, monkeypatch: pytest.MonkeyPatch, lora: dict[str, int] | None
