@@ -1,4 +1,4 @@
-"""LeRobot's own command, unmodified, evaluates a checkpoint of our policy in our kitchens."""
+"""LeRobot's own command, unmodified, evaluates checkpoints of our policies in our kitchens."""
 
 from __future__ import annotations
 
@@ -8,25 +8,24 @@ import sys
 from pathlib import Path
 
 import pytest
-from policy_support import tiny_config, unit_stats
-
-from robocasa_lerobot.policies.diffusion_transformer.modeling_diffusion_transformer import DiffusionTransformerPolicy
-from robocasa_lerobot.policies.diffusion_transformer.processor_diffusion_transformer import (
-    make_diffusion_transformer_pre_post_processors,
-)
+from flow_vla_support import tiny_config as tiny_vla
+from lerobot.configs import PreTrainedConfig
+from policy_support import build, tiny_config
 
 PIXELS = 32
 
 
+def save(folder: Path, config: PreTrainedConfig) -> Path:
+    """An untrained policy, saved as training saves it."""
+    for part in build(config):
+        part.save_pretrained(folder)
+    return folder
+
+
 @pytest.fixture(scope="module")
 def checkpoint(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """An untrained policy, saved as training saves it."""
     folder = tmp_path_factory.mktemp("checkpoint") / "pretrained_model"
-    config = tiny_config(pixels=PIXELS, push_to_hub=False)
-    DiffusionTransformerPolicy(config).save_pretrained(folder)
-    for processor in make_diffusion_transformer_pre_post_processors(config, dataset_stats=unit_stats()):
-        processor.save_pretrained(folder)
-    return folder
+    return save(folder, tiny_config(pixels=PIXELS, push_to_hub=False))
 
 
 def lerobot_eval(checkpoint: Path, out: Path, *arguments: str) -> dict[str, object]:
@@ -57,6 +56,22 @@ def test_one_task(checkpoint: Path, tmp_path: Path) -> None:
     assert info["overall"]["n_episodes"] == 1  # type: ignore[index]
     assert list(info["per_group"]) == ["OpenDrawer"]  # type: ignore[call-overload]
     assert list((tmp_path / "out" / "videos").rglob("*.mp4"))
+
+
+@pytest.mark.render
+@pytest.mark.slow
+def test_flow_vla_in_other_kitchens_and_another_preset(tmp_path: Path) -> None:
+    folder = save(tmp_path / "pretrained_model", tiny_vla(push_to_hub=False))
+    info = lerobot_eval(
+        folder,
+        tmp_path / "out",
+        "--env.task=OpenDrawer",
+        "--env.split=pretrain",
+        "--env.render_preset=quality",
+        "--eval.n_episodes=1",
+        "--eval.batch_size=1",
+    )
+    assert info["overall"]["n_episodes"] == 1  # type: ignore[index]
 
 
 @pytest.mark.render

@@ -21,21 +21,21 @@ PRESETS: dict[str, dict[str, Any]] = {
 }
 
 
-@pytest.mark.costly
-@pytest.mark.parametrize("preset", PRESETS)
-def test_lerobot_train_trains_our_presets(preset: str, tmp_path: Path) -> None:
-    data = write_fake_dataset(tmp_path / "data", episodes=2, length=32, image_size=64)
+def lerobot_train(folder: Path, preset: str, **more: Any) -> str:
+    """Two steps on a made-up dataset; what the command said."""
+    data = write_fake_dataset(folder / "data", episodes=2, length=32, image_size=64)
     file = configs_folder() / "policies" / f"{preset}.yaml"
     settings = {
         "dataset": {"repo_id": "local/data", "root": str(data)},
         "policy": {**yaml.safe_load(file.read_text(encoding="utf-8")), **PRESETS[preset], "device": "cpu"},
-        "output_dir": str(tmp_path / "out"),
+        "output_dir": str(folder / "out"),
         "batch_size": 2,
         "steps": 2,
         "num_workers": 0,
+        **more,
     }
     settings["policy"]["push_to_hub"] = False
-    config = tmp_path / "config.yaml"
+    config = folder / "config.yaml"
     config.write_text(yaml.safe_dump(settings), encoding="utf-8")
     done = subprocess.run(
         [str(Path(sys.executable).with_name("lerobot-train")), f"--config_path={config}"],
@@ -46,4 +46,22 @@ def test_lerobot_train_trains_our_presets(preset: str, tmp_path: Path) -> None:
         check=False,
     )
     assert done.returncode == 0, done.stderr[-2000:]
-    assert (tmp_path / "out" / "checkpoints" / "last" / "pretrained_model" / "model.safetensors").is_file()
+    assert (folder / "out" / "checkpoints" / "last" / "pretrained_model" / "model.safetensors").is_file()
+    return done.stdout + done.stderr
+
+
+@pytest.mark.costly
+@pytest.mark.parametrize("preset", PRESETS)
+def test_lerobot_train_trains_our_presets(preset: str, tmp_path: Path) -> None:
+    lerobot_train(tmp_path, preset)
+
+
+@pytest.mark.slow
+@pytest.mark.render
+def test_lerobot_train_evaluates_in_the_same_kitchens_again_and_again(tmp_path: Path) -> None:
+    """It closes its envs after each evaluation, and resets them for the next."""
+    env = {"type": "robocasa_kitchen", "task": "OpenDrawer", "image_size": 64, "episode_length": 3}
+    rounds = {"n_episodes": 1, "batch_size": 1}
+    lerobot_train(tmp_path, "diffusion_transformer_demo", env=env, env_eval_freq=1, eval=rounds)
+    films = [path.relative_to(tmp_path / "out/eval").parts[0] for path in (tmp_path / "out/eval").rglob("*.mp4")]
+    assert len(set(films)) == len(films) == 2
