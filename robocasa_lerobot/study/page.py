@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
-from robocasa_lerobot.evaluation.statistics.averages import Estimate, linear_combination
+from robocasa_lerobot.evaluation.statistics.averages import Estimate, linear_combination, ratio
 from robocasa_lerobot.evaluation.statistics.lifelong import Lifelong
 from robocasa_lerobot.files import write_text
 from robocasa_lerobot.study.figures import draw_curves, draw_matrices, draw_rates
@@ -197,8 +197,9 @@ def _retained(name: str, rows: Mapping[int, str], lifelong: Mapping[str, Lifelon
     if not earlier:
         return f"- {name}: not run to its end yet."
     after, before = _mean([matrix[last][j] for j in earlier]), _mean([matrix[j][j] for j in earlier])
-    share = f", {after.value / before.value:.0%} of it" if before.value else ""
-    kept = f"{_percent(after)}{share}{trainings}"
+    share = ratio(after, before)
+    of_it = "" if share is None else f", {_percent(share)} of it"
+    kept = f"{_percent(after)}{of_it}{trainings}"
     return f"- {name}: the earlier phases reached {_percent(before)}, and after the last one {kept}."
 
 

@@ -7,7 +7,13 @@ import pytest
 
 from robocasa_lerobot.benchmark.published import table
 from robocasa_lerobot.errors import UserError
-from robocasa_lerobot.evaluation.statistics import Estimate, average_over_tasks, linear_combination, wilson_interval
+from robocasa_lerobot.evaluation.statistics import (
+    Estimate,
+    average_over_tasks,
+    linear_combination,
+    ratio,
+    wilson_interval,
+)
 from robocasa_lerobot.evaluation.statistics.data_efficiency import demos_for_success, worth_of_pretraining
 from robocasa_lerobot.evaluation.statistics.horizon import success_curve, time_to_success
 from robocasa_lerobot.evaluation.statistics.lifelong import lifelong
@@ -84,6 +90,30 @@ def test_the_interval_of_an_average_covers_the_truth_in_about_95_of_100_evaluati
         hits += estimate.low <= truth <= estimate.high
     # Three standard errors of 600 repeats below 95 % are 2.7 points. Full table: benchmarks/interval_coverage.py.
     assert hits / repeats > 0.923
+
+
+def test_a_rate_as_a_share_of_another_covers_what_it_says() -> None:
+    """Two averages of nine tasks with eight trials each, as a lifelong study has them; and what is 0."""
+    before, after = np.linspace(0.0, 0.9, 9), np.linspace(0.0, 0.7, 9)
+    rng = np.random.default_rng(5)
+    truth, hits, repeats = after.mean() / before.mean(), 0, 600
+    for _ in range(repeats):
+        kept, reached = (average_over_tasks([(int(x), 8) for x in rng.binomial(8, rates)]) for rates in (after, before))
+        share = ratio(kept, reached)
+        assert share is not None
+        assert share.low <= share.value == pytest.approx(kept.value / reached.value)
+        hits += share.low <= truth <= share.high
+    assert 0.923 < hits / repeats < 0.99
+    nothing, some = Estimate(0.0, 0.0, 0.2), Estimate(0.5, 0.4, 0.6)
+    lost = ratio(nothing, some)
+    assert lost is not None
+    assert (lost.value, lost.low) == (0, 0)
+    assert 0.2 / 0.6 < lost.high < 0.2 / 0.4
+    assert ratio(some, nothing) is None
+    unsure = ratio(some, Estimate(0.5, 0.0, 0.9))
+    assert unsure is not None
+    assert unsure.high == np.inf
+    assert 0.4 / 0.9 < unsure.low < 1
 
 
 def test_combinations_keep_the_skew_and_turn_ends_with_the_sign() -> None:

@@ -169,8 +169,9 @@ def test_the_table_of_phases(tmp_path: Path) -> None:
     stored = {("lifelong", 0): run("lifelong", 0, *phases)}
     write_page(StudyConfig("r", "x", {"lifelong": part}), stored, SETS, tmp_path / "results", tmp_path / "page.md")
     text = (tmp_path / "page.md").read_text(encoding="utf-8")
-    reached = "plain: the earlier phases reached 100 % (51 to 100), and after the last one 25 % (5 to 70), 25% of it"
-    assert f"{reached}, from one training." in text
+    reached = "plain: the earlier phases reached 100 % (51 to 100), and after the last one 25 % (5 to 70), 25 % ("
+    assert reached in text
+    assert " of it, from one training." in text
     assert "|plain|38 % (" in text
     drawn = (tmp_path / "results" / "lifelong_rates.svg").read_text(encoding="utf-8")
     for words in ("plain", "after phase 2", "tasks of phase", "100 %", "25 %", "50 %"):

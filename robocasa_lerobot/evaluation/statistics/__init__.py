@@ -5,7 +5,7 @@ One question per file: `rates` (one task), `averages` (several tasks), `paired` 
 `data_efficiency` (how many demonstrations pretraining is worth), `progress` (how far trials come).
 """
 
-from robocasa_lerobot.evaluation.statistics.averages import Estimate, average_over_tasks, linear_combination
+from robocasa_lerobot.evaluation.statistics.averages import Estimate, average_over_tasks, linear_combination, ratio
 from robocasa_lerobot.evaluation.statistics.rates import Rate, success_rate
 from robocasa_lerobot.wilson import CONFIDENCE, wilson_interval
 
@@ -15,6 +15,7 @@ __all__ = [
     "Rate",
     "average_over_tasks",
     "linear_combination",
+    "ratio",
     "success_rate",
     "wilson_interval",
 ]

@@ -83,6 +83,23 @@ def linear_combination(
     return Estimate(value, value - down, value + up)
 
 
+def ratio(part: Estimate, whole: Estimate) -> Estimate | None:
+    """One rate as a share of another, its interval recovered from theirs, which count as independent.
+
+    None where the second is 0; with a lower end of 0 there, the upper end is infinite. Source: A. Donner and G. Y. Zou,
+    "Closed-form confidence intervals for functions of the normal mean and standard deviation", Statistical Methods in
+    Medical Research 21 (2012), for a ratio; its lower end written so that nothing cancels.
+    """
+    if whole.value <= 0:
+        return None
+    product = part.value * whole.value
+    of_low, of_high = part.low * (2 * part.value - part.low), part.high * (2 * part.value - part.high)
+    by_low, by_high = whole.low * (2 * whole.value - whole.low), whole.high * (2 * whole.value - whole.high)
+    high = (product + math.sqrt(max(0.0, product**2 - of_high * by_low))) / by_low if by_low > 0 else math.inf
+    below = product + math.sqrt(max(0.0, product**2 - of_low * by_high))
+    return Estimate(part.value / whole.value, of_low / below if below > 0 else 0.0, high)
+
+
 def _quadratic(side: Sequence[float], correlation: Sequence[Sequence[float]] | None) -> float:
     if correlation is None:
         return sum(x * x for x in side)
