@@ -43,12 +43,16 @@ class UnknownNameError(UserError):
 def suggest(name: str, known: Iterable[str]) -> str:
     """A sentence with the closest matches of `name`, or with all known names where none is close."""
     names = sorted(set(known))
-    by_lower = {n.lower(): n for n in names}
-    close = [by_lower[m] for m in difflib.get_close_matches(name.lower(), by_lower, n=3, cutoff=0.5)]
-    if close:
+    if close := closest(name, names):
         return "Did you mean " + " or ".join(repr(c) for c in close) + "?"
     shown = ", ".join(names[:20]) + (f", ... ({len(names)} in all)" if len(names) > 20 else "")
     return f"Known: {shown or 'none'}."
+
+
+def closest(name: str, known: Iterable[str], cutoff: float = 0.5) -> list[str]:
+    """Up to three known names that are like `name`, the most alike first; capitals do not count."""
+    by_lower = {one.lower(): one for one in known}
+    return [by_lower[match] for match in difflib.get_close_matches(name.lower(), by_lower, n=3, cutoff=cutoff)]
 
 
 def differing(found: Mapping[str, Any], now: Mapping[str, Any]) -> str:

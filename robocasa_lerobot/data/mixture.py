@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from robocasa_lerobot import contract
 from robocasa_lerobot.data.alike import check_alike, unseen_pictures
 from robocasa_lerobot.data.members import with_frames
-from robocasa_lerobot.data.mixture_config import DRAWN, LoaderConfig, MemberConfig, MixtureConfig
+from robocasa_lerobot.data.mixture_config import LoaderConfig, MemberConfig, MixtureConfig
 from robocasa_lerobot.data.reading.decisions import frame_pool
 from robocasa_lerobot.data.reading.frame_cache import FrameCache, cache_bytes, open_or_build, resize_images
 from robocasa_lerobot.data.reading.pictures import PictureReader
@@ -151,7 +151,7 @@ class MixtureDataset(torch.utils.data.Dataset[Item]):
         for place, part, probability in zip(self._place, self._members, self.probabilities, strict=True):
             digest.update(f"{place} {part.kind} {probability:.9g} {len(part.episodes)} ".encode())
             digest.update(part.episodes.astype("<i8").tobytes())
-        if self.config.draw != DRAWN[0]:  # said only then: phases that began before there was a choice go on
+        if self.config.episodes_first:  # said only then: phases that began before there was a choice go on
             digest.update(self.config.draw.encode())
         return digest.hexdigest()
 
@@ -169,7 +169,7 @@ class MixtureDataset(torch.utils.data.Dataset[Item]):
             tasks += f"; {member.frames}" if member.frames else ""
             tasks += f"; without {', '.join(part.source.depth)}" if part.source.depth else ""
             counts = f"{len(part.episodes)} episodes, {part.frames} frames"
-            counts += ", an episode first" if self.config.draw != DRAWN[0] else ""
+            counts += ", an episode first" if self.config.episodes_first else ""
             lines.append(f"{member.root} ({tasks}): {counts}, {probability:.{1 if probability >= 0.01 else 3}%}")
         return "\n".join(lines)
 
@@ -189,7 +189,7 @@ class MixtureDataset(torch.utils.data.Dataset[Item]):
     def sampler(self, seed: int, drop_last_frames: int = 0) -> MixtureSampler:
         """The sampler over the mixture; the last frames of each episode can be kept from starting a sample."""
         pools = [frame_pool(m.source, m.episodes, m.wanted, drop_last_frames) for m in self._members]
-        return MixtureSampler(pools, self.probabilities, seed, episodes_first=self.config.draw != DRAWN[0])
+        return MixtureSampler(pools, self.probabilities, seed, episodes_first=self.config.episodes_first)
 
     def set_windows(self, delta_timestamps: Mapping[str, Sequence[float]] | None) -> None:
         """The window of each key, in seconds relative to the frame, as LeRobot's `delta_timestamps`."""

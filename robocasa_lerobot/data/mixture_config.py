@@ -131,6 +131,11 @@ class MixtureConfig:
     shares: dict[str, float] | None = None
     draw: str = DRAWN[0]
 
+    @property
+    def episodes_first(self) -> bool:
+        """Whether an episode is drawn before one of its frames."""
+        return self.draw != DRAWN[0]
+
     def __post_init__(self) -> None:
         if self.draw not in DRAWN:
             raise UnknownNameError("choice", self.draw, DRAWN, "(what a mixture may `draw` of a dataset)")

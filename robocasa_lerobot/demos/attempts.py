@@ -125,10 +125,12 @@ class RecordingSettings:
         actor: Actor,
         noise_seed: int | None = None,
         clean: Sequence[Array] | None = None,
+        styled: bool = True,
     ) -> Recording:
         """An episode of an actor's; where noise comes to its actions, what it wanted is kept beside them.
 
-        An actor with noise of its own says what it wanted in `clean`, which it fills as it goes.
+        An actor with noise of its own says what it wanted in `clean`, which it fills as it goes. For one that follows
+        no style, `styled` is False.
         """
         yielded: list[Array] = []
 
@@ -142,7 +144,7 @@ class RecordingSettings:
             seed,
             action_noise=self.action_noise,
             images=self.images,
-            varied=self.varied,
+            varied=self.varied and styled,
             actor=noted,
             noise_seed=noise_seed,
         )

@@ -204,8 +204,8 @@ class GenerationSettings(RecordingSettings):
                 seed,
                 lambda env, style, log: course.counted(plain_episode(env, log, subtasks, course)),
                 clean=course.clean if noisy else None,
+                styled=False,  # subtasks are carried over as they are
             )
-            recording.ep_meta["motion_style"] = asdict(PLAIN)  # subtasks are carried over as they are
             if noisy:  # beside the noise that comes to every action
                 of_subtasks = [one.action_noise for one in subtasks.template.subtasks]
                 recording.ep_meta["action_noise"] = float(np.hypot(self.action_noise, max(of_subtasks)))

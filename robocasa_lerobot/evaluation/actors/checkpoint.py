@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import hashlib
 import json
 from collections.abc import Mapping
@@ -11,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from robocasa_lerobot import contract
-from robocasa_lerobot.errors import UnknownNameError, UserError
-from robocasa_lerobot.evaluation.records.results import REFERENCE_POLICIES, REPLAY, PolicyInfo
+from robocasa_lerobot.errors import UnknownNameError, UserError, closest
+from robocasa_lerobot.evaluation.records.results import REFERENCE_POLICIES, REFERENCE_TYPES, REPLAY, PolicyInfo
 from robocasa_lerobot.evaluation.remote.address import is_address, parse_address
 from robocasa_lerobot.evaluation.remote.introduction import RemotePolicy
 from robocasa_lerobot.policies.origin import ORIGIN_FILE, Origin, read_origin
@@ -51,7 +50,7 @@ class PolicySource:
     @property
     def is_reference(self) -> bool:
         """Whether this is `demonstrator`, `random`, `zero` or `replay`, and not a checkpoint."""
-        return self.type in (*REFERENCE_POLICIES, REPLAY)
+        return self.type in REFERENCE_TYPES
 
     @property
     def is_checkpoint(self) -> bool:
@@ -128,8 +127,8 @@ def check_name(path: str) -> None:
         return
     kind, colon, _ = path.partition(":")
     known = (REPLAY,) if colon else REFERENCE_POLICIES
-    close = difflib.get_close_matches(kind.lower(), known, n=1, cutoff=0.6)
-    if kind not in known and close and "/" not in path and not Path(path).exists():
+    # More alike than names that are suggested: a folder to come may be called anything.
+    if kind not in known and closest(kind, known, cutoff=0.6) and "/" not in path and not Path(path).exists():
         raise UnknownNameError("policy", path, [f"{name}:FILE" if colon else name for name in known])
 
 

@@ -32,6 +32,7 @@ OUTCOMES = (FINISHED, CRASHED, HUNG, DIVERGED)
 UNPERTURBED = "none"
 REFERENCE_POLICIES = ("demonstrator", "random", "zero")  # by their types
 REPLAY = "replay"  # written replay:FILE
+REFERENCE_TYPES = (*REFERENCE_POLICIES, REPLAY)
 
 # Stands for the "/" of a label in names of folders and files.
 _SLASH = "__"
@@ -122,7 +123,7 @@ class PolicyInfo:
     @property
     def is_checkpoint(self) -> bool:
         """Whether the run itself computed it, and so its device, and versions of torch, may change what it does."""
-        return self.type not in (*REFERENCE_POLICIES, REPLAY) and self.remote is None
+        return self.type not in REFERENCE_TYPES and self.remote is None
 
 
 @dataclass(frozen=True)
