@@ -8,7 +8,7 @@ import queue
 import socket
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 from urllib.parse import urlsplit
@@ -31,6 +31,9 @@ window.pad = {id: "test pad", index: 0, connected: false, mapping: "standard", a
 navigator.getGamepads = () => [window.pad.connected ? window.pad : null, null, null, null];
 """
 CODES = {"Space": " ", "Backspace": "Backspace", "Enter": "Enter"}
+# After which a gesture that shows nothing is made again, as people do: on a busy machine the page lets go of everything
+# where a picture is late, which is what it is for.
+AGAIN_S = 5.0
 
 
 class Page:
@@ -43,6 +46,11 @@ class Page:
     def phase(self) -> str:
         """As the page shows it."""
         return str(self.browser.ask("document.body.dataset.phase"))
+
+    @property
+    def late(self) -> bool:
+        """Whether time stands since a picture was late."""
+        return self.session.phase == "paused" and self.session.pause == "stale"
 
     @property
     def hand(self) -> NDArray[np.float64]:
@@ -71,15 +79,58 @@ class Page:
         deadline = time.monotonic() + WAIT_S
         while len(episode) < last:
             assert time.monotonic() < deadline, f"time stands: {self.phase}, {self.text('#veil')}"
+            self.go_on()
             time.sleep(0.01)
+
+    def gesture(self, begin: Callable[[], object], end: Callable[[], object], shows: Callable[[], object]) -> None:
+        """Begin something and go on with it until it shows, however long commands take on this machine; then end it."""
+        deadline = time.monotonic() + WAIT_S
+        shown = False
+        while not shown:
+            assert time.monotonic() < deadline, f"nothing to be seen of it: {self.phase}, {self.text('#veil')}"
+            self.go_on()
+            begin()
+            try:
+                again = time.monotonic() + AGAIN_S
+                while not (shown := bool(shows())) and time.monotonic() < again and not self.late:
+                    time.sleep(0.01)
+            finally:
+                end()
+
+    def wait(self, shows: Callable[[], object]) -> None:
+        """Wait until something shows."""
+        deadline = time.monotonic() + WAIT_S
+        while not shows():
+            assert time.monotonic() < deadline, f"nothing to be seen of it: {self.phase}, {self.text('#veil')}"
+            time.sleep(0.01)
+
+    def go_on(self) -> None:
+        """Where time stands since a picture was late, have it run."""
+        if self.late:
+            self.browser.until("document.querySelector('#veil-button').checkVisibility()", WAIT_S)
+            self.click("#veil-button")
+            self.until("running")
+
+    def hold_until(self, code: str, shows: Callable[[], object]) -> None:
+        """Hold a key until what it is for shows."""
+        key = CODES.get(code, "")
+        self.gesture(lambda: self.browser.key(code, True, key), lambda: self.browser.key(code, False, key), shows)
+
+    def rest(self) -> NDArray[np.float64]:
+        """Wait until the hand stands still; where."""
+        deadline = time.monotonic() + WAIT_S
+        while True:
+            before = self.hand
+            self.steps(4)
+            if np.abs(self.hand - before).max() < 0.004:
+                return self.hand
+            assert time.monotonic() < deadline, "the hand never comes to rest"
 
     def hold(self, code: str, steps: int) -> None:
         """Hold a key for so many control steps."""
-        self.browser.key(code, True, CODES.get(code, ""))
-        try:
-            self.steps(steps)
-        finally:
-            self.browser.key(code, False, CODES.get(code, ""))
+        episode = self.session.driven
+        last = len(episode) + steps
+        self.hold_until(code, lambda: len(episode) >= last)
 
     def pad(self, axes: list[float] | None = None, **pressed: float) -> None:
         """Put the gamepad's sticks and buttons (`b7=0.5`) somewhere."""
@@ -94,12 +145,14 @@ class Page:
         if self.phase == "ready":
             return
         scenes = self.session.scenes
-        self.click("#redo" if self.phase not in ("review", "saving") else "#review-redo")
-        if self.browser.ask("document.querySelector('#leave-dialog').open"):
-            self.click("#leave-ok")
-        deadline = time.monotonic() + WAIT_S
+        deadline, again = time.monotonic() + WAIT_S, 0.0
         while self.session.scenes == scenes or self.phase != "ready":
             assert time.monotonic() < deadline, f"no fresh kitchen: {self.phase}, {self.browser.messages}"
+            if self.browser.ask("document.querySelector('#leave-dialog').open"):
+                self.click("#leave-ok")
+            elif self.session.scenes == scenes and time.monotonic() > again:
+                self.click("#redo" if self.phase not in ("review", "saving") else "#review-redo")
+                again = time.monotonic() + AGAIN_S
             time.sleep(0.05)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import socket
 import time
@@ -12,7 +13,7 @@ from pathlib import Path
 from urllib.parse import urlsplit
 
 import pytest
-from teleop_support import Served, served, settings
+from teleop_support import WAIT_S, Served, served, settings
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from robocasa_lerobot.errors import UserError
@@ -63,6 +64,16 @@ def get(session: Served, path: str, **headers: str) -> tuple[int, bytes]:
 
 def token(session: Served) -> str:
     return urlsplit(session.address).query.removeprefix("t=")
+
+
+def go_on(operator: TeleopClient) -> None:
+    """Have time run; asked for again where an answer took too long once more, as on a busy machine."""
+    deadline = time.monotonic() + WAIT_S
+    while operator.frame["phase"] != "running":
+        assert time.monotonic() < deadline, operator.frame
+        operator.send("resume")
+        with contextlib.suppress(TimeoutError):
+            operator.until_phase("running", seconds=1.0)
 
 
 def test_without_the_token_there_is_nothing(session: Served, operator: TeleopClient) -> None:
@@ -151,8 +162,7 @@ def test_pictures_wait_for_who_does_not_acknowledge_and_time_stands(session: Ser
         operator._acknowledges = True
         operator.send("ack", frame=operator.frame["id"])
         operator.until(lambda: operator.frame["id"] > last + MOST_UNACKNOWLEDGED)
-        operator.send("resume")
-        assert operator.until_phase("running")
+        go_on(operator)
 
 
 def test_who_has_long_answered_no_picture_cannot_have_time_run(session: Served, operator: TeleopClient) -> None:
@@ -169,8 +179,7 @@ def test_who_has_long_answered_no_picture_cannot_have_time_run(session: Served, 
         assert (viewer.frame["phase"], viewer.frame["pause"]) == ("paused", "stale")
         operator._acknowledges = True
         operator.send("ack", frame=operator.frame["id"])
-        operator.send("resume")
-        assert operator.until_phase("running")
+        go_on(operator)
 
 
 def test_the_age_of_the_picture_that_a_command_answers_is_told(operator: TeleopClient) -> None:

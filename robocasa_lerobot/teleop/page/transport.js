@@ -20,8 +20,9 @@ export class Transport {
     this.reviewUndo = false; // its button is held
     const click = (id, action) =>
       $(id).addEventListener("click", (event) => {
+        // A click must not leave Space and Enter on the button; a dialog gives the keys back to what had them before it.
+        if (event.detail) event.currentTarget.blur();
         action();
-        if (event.detail) event.currentTarget.blur(); // a click must not leave Space and Enter on the button
       });
     click("pause", () => this.pause());
     hold($("undo"), (on) => this.undo(on));
