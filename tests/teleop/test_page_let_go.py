@@ -100,7 +100,8 @@ def test_a_running_episode_is_not_lost_at_one_click(page: Page, button: str) -> 
     page.click("#leave-dialog [value=cancel]")
     page.browser.until("document.activeElement === document.body")  # Space is the robot's, not that button's
     page.hold("KeyR", 3)
-    assert (page.session.phase, page.session.scenes) == ("running", scenes)
+    page.until("running")
+    assert page.session.scenes == scenes
     page.click("#end")
     page.until("review")
     page.browser.ask("seek.value = 0, seek.dispatchEvent(new Event('input'))")  # its first step is shown
