@@ -84,7 +84,7 @@ def run(args: argparse.Namespace) -> int:
     from robocasa_lerobot.study.page import write_page
     from robocasa_lerobot.study.runs import CUDA, Run, configs_for, root_for, runs_of
     from robocasa_lerobot.study.sharing import alone, helped_by, shared_runs, threads_of_each, trainings_at_once
-    from robocasa_lerobot.study.stored import check_results, is_stored, read_stored, stands_for, store
+    from robocasa_lerobot.study.stored import check_results, is_stored, phases_left, read_stored, stands_for, store
 
     numbers = parse_episodes(args.episodes) if args.episodes else {}
     episodes = ",".join(f"{kind}={number}" for kind, number in sorted(numbers.items())) or None
@@ -106,7 +106,8 @@ def run(args: argparse.Namespace) -> int:
             runs[name] = [run for run in own if not is_stored(run, results)]
         cores = args.workers or cores_here()
         beside = at_once(sum(map(len, runs.values())))
-        found = costs(study, runs, configs, cores, args.measure, beside)
+        left = {run: phases_left(run, results) for own in runs.values() for run in own}
+        found = costs(study, runs, configs, cores, args.measure, beside, left)
         print("\n".join(cost_lines(parts, found, cores, args.device, beside)))
         return 0
     shown = study.shown_with(parts)
@@ -131,7 +132,8 @@ def run(args: argparse.Namespace) -> int:
     with helped_by(beside - 1, [*_words(args), "--at_once=1"], root, threads):
         for run in shared_runs(wanted, ended, root):
             print(f"== {wanted.index(run) + 1} of {len(wanted)}: {run.name}", flush=True)
-            for _ in run.carry_out(args.workers, threads, lambda: alone(root, "data")):
+            phases = phases_left(run, results)
+            for _ in run.carry_out(args.workers, threads, lambda: alone(root, "data"), phases):
                 with alone(root, "page"):
                     print(f"kept: {store(run, results)}", flush=True)
                     report()

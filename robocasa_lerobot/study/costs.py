@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -61,8 +61,11 @@ def costs(
     cores: int,
     measured_steps: int,
     at_once: int,
+    left: Mapping[Run, Collection[str]],
 ) -> dict[str, Cost]:
     """What each part takes; `runs` are those of each part that no earlier part has and that have not ended.
+
+    `left` are the phases of each that are still to be run. Data are those of all its phases, as they are made.
 
     Trainings are measured with the threads that each of `at_once` has beside the others, and alone: they share caches
     and memory as well, so that two of the demo's policy take 6 % longer than that.
@@ -75,7 +78,10 @@ def costs(
     measured: dict[str, float | str] = {}
     recorded: set[Path] = set()
     # Other seeds need the same data and take as long, where they have not begun.
-    kinds = {run: run.name if run.folder.exists() else run.experiment for own in runs.values() for run in own}
+    begun = {
+        run for own in runs.values() for run in own if run.folder.exists() or len(left[run]) < len(run.config.phases)
+    }
+    kinds = {run: run.name if run in begun else run.experiment for own in runs.values() for run in own}
     plans: dict[str, _Plan] = {}
     total = len(set(kinds.values()))
     with (
@@ -84,7 +90,7 @@ def costs(
     ):
         for run, kind in kinds.items():
             if kind not in plans:
-                plans[kind] = _planned(run, pixels, measured_steps, measured)
+                plans[kind] = _planned(run, pixels, measured_steps, measured, left[run])
                 bar.update()
     out: dict[str, Cost] = {}
     for part, own in runs.items():
@@ -132,11 +138,14 @@ class _Plan:
     steps: int
 
 
-def _planned(run: Run, pixels: int | None, measured_steps: int, measured: dict[str, float | str]) -> _Plan:
+def _planned(
+    run: Run, pixels: int | None, measured_steps: int, measured: dict[str, float | str], wanted: Collection[str]
+) -> _Plan:
     sizes = () if pixels is None else (f"--loader.image_size={pixels}",)
     experiment = run.loaded(sizes)
     needs, _ = needs_of(experiment, parse_episodes(run.episodes) if run.episodes else {})
     phases = plan_experiment(experiment, measured_steps=measured_steps, measured=measured)
+    phases = [plan for plan in phases if plan.phase.name in wanted]
     evaluations = plan_evaluations(experiment, [plan.phase for plan in phases if not plan.left_out])
     left = [_share_left(run, item) for item in evaluations]
     return _Plan(

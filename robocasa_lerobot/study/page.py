@@ -12,7 +12,14 @@ from robocasa_lerobot.files import write_text
 from robocasa_lerobot.study.figures import draw_curves, draw_matrices, draw_rates
 from robocasa_lerobot.study.runs import CPU
 from robocasa_lerobot.study.settings import PartConfig, RowConfig, StudyConfig
-from robocasa_lerobot.study.stored import FILMED_SEED, StoredRun, StoredTrial, stored_folder, strips_name
+from robocasa_lerobot.study.stored import (
+    FILMED_SEED,
+    StoredRun,
+    StoredTrial,
+    circumstances,
+    stored_folder,
+    strips_name,
+)
 from robocasa_lerobot.study.tables import (
     CellRate,
     Stored,
@@ -235,12 +242,13 @@ def _circumstances(part: PartConfig, stored: Iterable[StoredRun]) -> list[str]:
     wanted = {(row.experiment, row.phase) for row in part.rows.values()}
     asked = sum(part.seeds_of(experiment) for experiment, _ in wanted)
     ended = sum((run.experiment, phase) in wanted for run in runs for phase in run.phases)
-    training = sum(float(run.about["training_hours"]) for run in runs)
-    trying = sum(float(run.about["trial_hours_of_one_process"]) for run in runs)
-    commits = sorted({_short_commit(str(run.about["commit"])) for run in runs})
-    machines = sorted({f"{run.about['machine']['processor']}, {run.about['machine']['cores']} cores" for run in runs})
-    versions = sorted({f"{name} {number}" for run in runs for name, number in run.about["versions"].items()})
-    devices = ", ".join(sorted({str(run.about["device"]) for run in runs} - {CPU}))
+    each = [one for run in runs for one in circumstances(run.about)]
+    training = sum(float(one["training_hours"]) for one in each)
+    trying = sum(float(one["trial_hours_of_one_process"]) for one in each)
+    commits = sorted({_short_commit(str(one["commit"])) for one in each})
+    machines = sorted({f"{one['machine']['processor']}, {one['machine']['cores']} cores" for one in each})
+    versions = sorted({f"{name} {number}" for one in each for name, number in one["versions"].items()})
+    devices = ", ".join(sorted({str(one["device"]) for one in each} - {CPU}))
     text = (
         f"{ended} of {asked} trainings, {training:.1f} hours of training"
         f"{f' (on {devices})' if devices else ''} and {trying:.1f} process-hours of trials "

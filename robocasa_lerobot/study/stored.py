@@ -16,6 +16,7 @@ from typing import Any
 from robocasa_lerobot.errors import UserError, differing
 from robocasa_lerobot.evaluation.records.results import UNPERTURBED, TrialRecord, read_results
 from robocasa_lerobot.files import write_text, written_aside
+from robocasa_lerobot.making.needs import needs_of
 from robocasa_lerobot.provenance import git_commit, machine, utc_now, versions
 from robocasa_lerobot.settings import load_yaml
 from robocasa_lerobot.study.runs import CPU, Run
@@ -28,6 +29,8 @@ from robocasa_lerobot.training.records import PHASE_FILE
 TRIALS, CURVES, ABOUT = "trials.csv.gz", "curves.csv", "about.json"
 FILMED_SEED = 0  # whose film strips are kept
 _CURVE_POINTS = 100  # of each phase
+# What stays of a run's earlier folders.
+_CIRCUMSTANCES = ("commit", "versions", "machine", "device", "training_hours", "trial_hours_of_one_process", "ended")
 
 
 @dataclass(frozen=True)
@@ -54,7 +57,8 @@ class StoredRun:
     Attributes:
         experiment, seed: which one.
         trials: of all evaluations of those phases.
-        about: their steps; commit, versions, machine, hours.
+        about: their steps; commit, versions, machine and hours of `phases`, those of the folder that was stored last,
+            and a list of the same, `earlier`, where others had been kept and their folders were gone.
         curves: rows of phase, step and loss.
     """
 
@@ -82,6 +86,8 @@ def strips_name(phase: str, evaluation: str) -> str:
 
 def store(run: Run, results: Path) -> Path:
     """Keep the phases of a run that have ended; its folder. `about.json` is written last: with it, all are there.
+
+    Phases that were kept before and whose folders are gone stay, and what they were trained with is told beside.
 
     Raises:
         UserError: none has all evaluations that the experiment asks for.
@@ -111,6 +117,19 @@ def store(run: Run, results: Path) -> Path:
                 write_strips(folder / FOLDER / name, records, out / strips_name(phase.name, name))
         about_phase = json.loads((folder / PHASE_FILE).read_text(encoding="utf-8"))
         devices.append(str(about_phase.get("device", experiment.device)))  # those of before did not note it
+    names = {phase.name for phase in ended}
+    before = read_stored(results, run.experiment, run.seed)
+    earlier: list[dict[str, Any]] = []
+    if before is not None and stands_for(before.about, run):
+        earlier = before.about.get("earlier", [])
+        if not names.issuperset(before.about.get("phases", before.about["steps"])):
+            earlier = [*earlier, {name: before.about.get(name) for name in _CIRCUMSTANCES}]
+        trials += [trial for trial in before.trials if trial.phase not in names]
+        curves += [point for point in before.curves if point[0] not in names]
+        names |= set(before.about["steps"])
+    kept = [phase for phase in experiment.phases if phase.name in names]
+    order = [phase.name for phase in kept]
+    curves.sort(key=lambda point: (order.index(point[0]), point[1]))
     out.mkdir(parents=True, exist_ok=True)
     _write_trials(out / TRIALS, trials)
     rows = ["phase,step,loss", *(f"{phase},{step},{loss:.6g}" for phase, step, loss in curves)]
@@ -124,14 +143,37 @@ def store(run: Run, results: Path) -> Path:
         "versions": versions("lerobot", "torch", "mujoco"),
         "machine": machine(),
         "device": ", ".join(dict.fromkeys(devices)),
-        "steps": {phase.name: phase.steps for phase in ended},
-        "evaluations": _evaluations(run.config.phases, {phase.name for phase in ended}),
+        "steps": {phase.name: phase.steps for phase in kept},
+        "evaluations": _evaluations(run.config.phases, names),
         "training_hours": round(training / 3600, 3),
         "trial_hours_of_one_process": round(trying / 3600, 3),
         "ended": utc_now(),
+        "phases": [phase.name for phase in ended],
+        "earlier": earlier,
     }
     write_text(out / ABOUT, json.dumps(about, indent=1) + "\n")
     return out
+
+
+def circumstances(about: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """With what a run's phases were trained and tried: of those of this folder, and of those that it had before."""
+    return [about, *about.get("earlier", [])]
+
+
+def phases_left(run: Run, results: Path) -> list[str]:
+    """The phases of a run that are still to be run: those that were not kept, and what these build on.
+
+    What was kept needs no checkpoint any more; what a later phase starts from, or whose policy is corrected for it,
+    does: it is trained again where its folder is gone.
+    """
+    about = _about(results, run)
+    kept = about["steps"] if about is not None and stands_for(about, run) else {}
+    left: set[str] = set()
+    for phase in run.config.phases:
+        if phase.name not in kept:
+            left |= {phase.name, *(one.name for one in run.config.ancestors(phase))}
+            left |= {need.policy.name for need in needs_of(run.config, phase=phase.name)[0] if need.policy is not None}
+    return [phase.name for phase in run.config.phases if phase.name in left]
 
 
 def is_stored(run: Run, results: Path) -> bool:

@@ -79,11 +79,11 @@ def between_trainings(rows: Iterable[Sequence[float]]) -> tuple[float, int] | No
 def difference(
     one: Sequence[tuple[int, StoredTrial]], other: Sequence[tuple[int, StoredTrial]], tasks: Iterable[str]
 ) -> Estimate | None:
-    """Rate of `one` minus rate of `other` over the trials that both have.
+    """Rate of `one` minus rate of `other` over the trials that both have: of as many trainings as `one` has.
 
-    None where they share none, or where one has trainings that the other has not: its rate is not of these trials.
+    None where they share none, or where `one` has trainings that `other` has not: its rate is not of these trials.
     """
-    if {seed for seed, _ in one} != {seed for seed, _ in other}:
+    if not {seed for seed, _ in one} <= {seed for seed, _ in other}:
         return None
     kept = tuple(tasks)
     pairs: dict[str, tuple[list[bool], list[bool]]] = {}

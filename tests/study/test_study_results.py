@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import re
+import shutil
 from pathlib import Path
 
 import pytest
@@ -239,6 +240,47 @@ def test_phases_are_stored_as_they_end(tmp_path: Path) -> None:
     assert not files.stands_for({**found.about, "steps": {"phase1": steps - 1}}, run), "of other lengths"
     assert not files.stands_for({**found.about, "scale": "tiny"}, run)
     assert not files.stands_for({**found.about, "device": "NVIDIA H200"}, run)
+
+
+def test_what_was_kept_stays_where_its_folder_is_gone(tmp_path: Path) -> None:
+    run = files.Run("lifelong", 1, tmp_path, configs_folder())
+    run.write_file()
+    results = tmp_path / "results"
+    steps, every = run.config.phases[0].steps, [phase.name for phase in run.config.phases]
+    assert files.phases_left(run, results) == every
+    for name in every[:-2]:
+        phase_with_trials(run.folder / name, steps, "study_validation")
+    files.store(run, results)
+    left = ["phase1", "lora_phase2", "lora_phase3", "lora_phase4"]  # with what the two that are left build on
+    assert files.phases_left(run, results) == left
+    assert [words[2] for words in run.commands(1, left)[1:]] == [f"--phase={name}" for name in left]
+    shutil.rmtree(run.folder)
+    phase_with_trials(run.folder / "phase1", steps, "study_validation")
+    for _ in range(2):  # the second time there is nothing new
+        files.store(run, results)
+        found = read_stored(results, "lifelong", 1)
+        assert found is not None
+        assert found.phases == tuple(every[:-2])
+        assert [trial.phase for trial in found.trials] == sorted(every[:-2])
+        assert found.about["phases"] == ["phase1"]
+        hours = [about["training_hours"] for about in files.circumstances(found.about)]
+        assert hours == [pytest.approx(steps * 0.1 * trained / 3600, abs=0.001) for trained in (1, len(every) - 2)]
+    for name in left:
+        phase_with_trials(run.folder / name, steps, "study_validation")
+    files.store(run, results)
+    assert files.is_stored(run, results)
+    assert files.phases_left(run, results) == []
+
+
+def test_a_policy_that_is_corrected_is_trained_again_where_it_is_gone(tmp_path: Path) -> None:
+    run = files.Run("corrections", 0, tmp_path, configs_folder())
+    run.write_file()
+    results = tmp_path / "results"
+    for phase in run.config.phases:
+        if phase.name != "corrected":
+            phase_with_trials(run.folder / phase.name, phase.steps, "study_target")
+    files.store(run, results)
+    assert files.phases_left(run, results) == ["train", "corrected"]
 
 
 def test_a_run_without_a_device_of_its_own_is_of_the_machine_s(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -171,6 +171,6 @@ def test_registries_that_lean_on_others_and_on_defaults_serve_a_gpu_too(
 
 def test_costs_need_no_registry_that_says_everything(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     study = own_configs(tmp_path, monkeypatch, "base: study.yaml\n")
-    assert costs(study, {}, tmp_path / "configs", 1, 0, 1) == {}
+    assert costs(study, {}, tmp_path / "configs", 1, 0, 1, {}) == {}
     (tmp_path / "configs" / study.registry).write_text("root: mine\n")
-    assert costs(study, {}, tmp_path / "configs", 1, 0, 1) == {}
+    assert costs(study, {}, tmp_path / "configs", 1, 0, 1, {}) == {}
