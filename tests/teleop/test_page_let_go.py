@@ -97,7 +97,9 @@ def test_a_running_episode_is_not_lost_at_one_click(page: Page, button: str) -> 
     scenes = page.session.scenes
     page.click(f"#{button}")
     page.browser.until("document.querySelector('#leave-dialog').open")
+    page.until("paused")  # nobody can drive now
     page.click("#leave-dialog [value=cancel]")
+    page.until("running")
     page.browser.until("document.activeElement === document.body")  # Space is the robot's, not that button's
     page.hold("KeyR", 3)
     page.until("running")

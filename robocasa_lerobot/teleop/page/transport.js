@@ -7,17 +7,13 @@ const REPEAT_MS = 80;
 const UNDO_SPEED = 2; // times real time
 const SPEEDS = [1, 4];
 
-function open(dialog) {
-  dialog.returnValue = ""; // Escape leaves what the button said the time before
-  dialog.showModal();
-}
-
 export class Transport {
   constructor(send) {
     this.send = send;
     this.head = null;
     this.undoing = null;
     this.reviewUndo = false; // its button is held
+    this.stopped = false; // time stands for a dialog
     const click = (id, action) =>
       $(id).addEventListener("click", (event) => {
         // A click must not leave Space and Enter on the button; a dialog gives the keys back to what had them before it.
@@ -32,7 +28,7 @@ export class Transport {
     click("end", () => send({ type: "end" }));
     click("stop-assist", () => send({ type: "stop" }));
     for (const id of ["finish", "redo", "review-redo"]) click(id, () => this.leave(id.replace("review-", "")));
-    for (const id of ["discard", "review-discard"]) click(id, () => open($("discard-dialog")));
+    for (const id of ["discard", "review-discard"]) click(id, () => this.open($("discard-dialog")));
     click("veil-button", () => send({ type: "resume" }));
     click("save", () => send({ type: "save", trim: $("trim").checked }));
     click("continue", () => send({ type: "continue" }));
@@ -44,14 +40,28 @@ export class Transport {
     choice($("review-speed"), SPEEDS.map((speed) => [speed, `${speed}×`]), (speed) => send({ type: "review", speed }));
     $("seek").addEventListener("input", () => send({ type: "review", play: false, seek: Number($("seek").value) }));
     $("discard-dialog").addEventListener("close", () => {
-      if ($("discard-dialog").returnValue !== "ok") return;
+      if ($("discard-dialog").returnValue !== "ok") return this.goOn();
       const reason = $("reason-text").value.trim() || $("reason").value;
       send({ type: "discard", reason });
       $("reason-text").value = "";
     });
     $("leave-dialog").addEventListener("close", () => {
       if ($("leave-dialog").returnValue === "ok") send({ type: this.leaving });
+      else this.goOn();
     });
+  }
+
+  /** Ask in a dialog. While it has the keys nobody can drive, so time stands until it is closed. */
+  open(dialog) {
+    this.stopped = this.head?.phase === "running";
+    if (this.stopped) this.send({ type: "pause" });
+    dialog.returnValue = ""; // Escape leaves what the button said the time before
+    dialog.showModal();
+  }
+
+  /** After a dialog in which nothing was chosen: as before it. */
+  goOn() {
+    if (this.stopped) this.send({ type: "resume" });
   }
 
   /** `redo` or `finish`, which lose the running episode: asked for once more where there is anything of it. */
@@ -60,7 +70,7 @@ export class Transport {
     this.leaving = type;
     text($("leave-title"), type === "redo" ? "Do this kitchen again" : "Finish the session");
     text($("leave-ok"), type === "redo" ? "Redo" : "Finish");
-    open($("leave-dialog"));
+    this.open($("leave-dialog"));
   }
 
   setUp(hello) {
