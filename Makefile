@@ -81,7 +81,7 @@ doctor: $(STAMP)  ## check this machine
 bench: $(STAMP)  ## our simulator beside robosuite's, in one run
 	$(BIN)/python benchmarks/sim_speed.py $(BENCH_ARGS)
 
-# `make bench-training BENCH_ARGS=--quick` takes about 10 minutes.
+# `make bench-training BENCH_ARGS=--quick` takes about 15 minutes.
 bench-training: $(STAMP)  ## our training beside lerobot-train, and the loaders alone, in one run
 	$(BIN)/python benchmarks/training_speed.py $(BENCH_ARGS)
 

@@ -35,7 +35,12 @@ OBSERVATIONS, CHUNKS = (1, 2), (10, 50)
 
 @dataclass(frozen=True)
 class Effort:
-    """How much is measured: runs of each training, windows of steps in each, and seconds of a loader alone."""
+    """How much is measured: runs of each training, windows of steps in each, and seconds of a loader alone.
+
+    Attributes:
+        policies: presets, in batches of `batch_size`: LeRobot's default of 8 on a CPU.
+        larger: preset, batch size and window of what is measured in other batches as well.
+    """
 
     policies: tuple[str, ...]
     repetitions: int
@@ -44,18 +49,26 @@ class Effort:
     windows: int
     loader_seconds: float
     episodes: int
+    larger: tuple[tuple[str, int, int], ...] = ()
+
+    @property
+    def trainings(self) -> dict[str, tuple[str, int, int]]:
+        """Preset, batch size and window by name in the result."""
+        found = {policy: (policy, self.batch_size, self.window) for policy in self.policies}
+        return found | {f"{policy}_of_{batch}": (policy, batch, window) for policy, batch, window in self.larger}
 
 
-FULL = Effort(("demo", "compact"), 5, batch_size=8, window=20, windows=3, loader_seconds=5.0, episodes=8)
-QUICK = Effort(("demo",), 2, batch_size=8, window=15, windows=2, loader_seconds=2.0, episodes=4)
-FULL_GPU = dataclasses.replace(FULL, policies=("compact", "benchmark"), repetitions=3, batch_size=64)
-QUICK_GPU = dataclasses.replace(QUICK, policies=("compact",), batch_size=64)
+DEMO = ("demo", 64, 5)  # as `configs/experiments/demo.yaml` trains it
+FULL = Effort(("demo", "compact"), 5, 8, window=20, windows=3, loader_seconds=5.0, episodes=8, larger=(DEMO,))
+QUICK = Effort(("demo",), 2, batch_size=8, window=15, windows=2, loader_seconds=2.0, episodes=4, larger=(DEMO,))
+FULL_GPU = dataclasses.replace(FULL, policies=("compact", "benchmark"), repetitions=3, batch_size=64, larger=())
+QUICK_GPU = dataclasses.replace(QUICK, policies=("compact",), batch_size=64, larger=())
 
 
 def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
     """The command's options."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--quick", action="store_true", help="one policy, fewer and shorter runs: about 10 minutes")
+    parser.add_argument("--quick", action="store_true", help="one policy, fewer and shorter runs: about 15 minutes")
     parser.add_argument("--device", choices=("cpu", "cuda"), help="default: cuda where there is one")
     parser.add_argument("--workers", type=int, nargs="+", help="loader processes to try; default: two sensible numbers")
     parser.add_argument("--dataset", type=Path, help="a LeRobotDataset v3.0 with the contract's features")
@@ -78,25 +91,25 @@ def worker_counts(device: str, cores: int) -> tuple[int, ...]:
 def measure_training(
     effort: Effort, dataset: Path, device: str, counts: Sequence[int], bar: Bar, noise: list[float]
 ) -> dict[str, dict[str, Any]]:
-    """Figures of every side, by policy."""
+    """Figures of every side, by training."""
     sides = training_sides.sides(counts, counts[:1] if device == "cpu" else counts)
     found: dict[str, dict[str, Any]] = {}
-    for policy in effort.policies:
+    for name, (policy, batch_size, window) in effort.trainings.items():
         settings = training_sides.policy_settings(policy)
         runs: dict[str, list[dict[str, float]]] = {side.key: [] for side in sides}
         with tempfile.TemporaryDirectory(dir=_made(WORK), prefix="runs-") as folder:
             job = training_sides.Job(
-                settings, dataset, device, effort.batch_size, effort.window, effort.windows, Path(folder) / policy
+                settings, dataset, device, batch_size, window, effort.windows, Path(folder) / policy
             )
             for repetition in range(effort.repetitions):
                 # Who goes first alternates: a slow drift of the machine favours nobody.
                 for side in sides if repetition % 2 == 0 else reversed(sides):
-                    bar.set_description(f"{policy}, {side.key}")
+                    bar.set_description(f"{name}, {side.key}")
                     note_noise(noise)
                     runs[side.key].append(training_sides.run(side, job))
                     bar.update()
-        found[policy] = {
-            key: {name: common.spread([run[name] for run in of_side]) for name in of_side[0]}
+        found[name] = {
+            key: {figure: common.spread([run[figure] for run in of_side]) for figure in of_side[0]}
             for key, of_side in runs.items()
         }
     return found
@@ -161,7 +174,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parts = effort.repetitions * len(OBSERVATIONS) * len(CHUNKS) * 3
     if not options.loaders_only:
         sides = training_sides.sides(counts, counts[:1] if device == "cpu" else counts)
-        parts += effort.repetitions * len(effort.policies) * len(sides)
+        parts += effort.repetitions * len(effort.trainings) * len(sides)
     try:
         dataset, kind = prepare_dataset(options, effort, machine["cores"])
         with Bar(total=parts, unit="part", smoothing=0) as bar:

@@ -12,6 +12,7 @@ from typing import Any
 
 import pytest
 import torch
+import yaml
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.errors import UserError
@@ -207,6 +208,16 @@ def check_result(result: dict[str, Any]) -> None:
     assert {f"loader_{o}x{c}_cached" for o in (1, 2) for c in (10, 50)} <= set(result["ratios"])
     assert str(REPOSITORY) not in json.dumps(result)
     assert module("training_report").report(result).count("\n") > 20
+
+
+def test_the_demo_is_measured_in_its_own_batches_too() -> None:
+    speed = module("training_speed")
+    own = yaml.safe_load((REPOSITORY / "configs/experiments/demo.yaml").read_text())["defaults"]["batch_size"]
+    for effort in (speed.QUICK, speed.FULL):
+        policy, batch, _ = effort.trainings[f"demo_of_{own}"]
+        assert (policy, batch) == ("demo", own)
+        assert effort.trainings["demo"][1] == effort.batch_size == 8, "LeRobot's default"
+    assert list(speed.QUICK_GPU.trainings) == ["compact"]
 
 
 def test_ratios_take_the_best_of_each_side_and_equal_workers_for_the_loop() -> None:
