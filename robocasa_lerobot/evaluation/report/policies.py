@@ -11,7 +11,14 @@ import numpy as np
 
 from robocasa_lerobot.benchmark import published
 from robocasa_lerobot.evaluation.config.evaluation import KITCHEN_ENV_FACTORY
-from robocasa_lerobot.evaluation.records.results import TRIALS_FILE, UNPERTURBED, PolicyInfo, RunHeader, TrialRecord
+from robocasa_lerobot.evaluation.records.results import (
+    REFERENCE_TYPES,
+    TRIALS_FILE,
+    UNPERTURBED,
+    PolicyInfo,
+    RunHeader,
+    TrialRecord,
+)
 from robocasa_lerobot.evaluation.report.places import PERTURBATIONS, Place, places, tables
 from robocasa_lerobot.evaluation.statistics import Estimate, Rate, average_over_tasks
 from robocasa_lerobot.evaluation.statistics.paired import Outcomes
@@ -251,7 +258,7 @@ def _may_share_kitchen(a: TrialRecord, b: TrialRecord) -> bool:
 
 def is_reference(policy: PolicyResult) -> bool:
     """Whether a policy was not learned, but is one of those that others are measured by."""
-    return policy.info.type in REFERENCES
+    return policy.info.type in REFERENCE_TYPES
 
 
 def label_under(label: str, condition: str) -> str:
