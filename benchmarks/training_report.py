@@ -99,7 +99,9 @@ def _notes(body: dict[str, Any]) -> str:
     data = body["dataset"]
     lines = [
         f"{data['kind']} dataset: {data['episodes']} episodes, {data['frames']} frames; batches of "
-        f"{body['effort']['batch_size']} where no other number stands, on {body['device']}."
+        f"{body['effort']['batch_size']} where no other number stands, on {body['device']}. "
+        f"LeRobot decodes with {body['lerobot_decodes_with']}"
+        + (", since torchcodec finds no FFmpeg." if body["lerobot_decodes_with"] == "pyav" else ".")
     ]
     if body["device"] != "cpu":
         for policy, measured in body["training"].items():

@@ -165,6 +165,8 @@ def prepare_dataset(options: argparse.Namespace, effort: Effort, cores: int) -> 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Measure, print, write."""
     options = parse(arguments)
+    from lerobot.utils.import_utils import get_safe_default_video_backend
+
     device = options.device or _best_device()
     small, large = (QUICK, FULL) if device == "cpu" else (QUICK_GPU, FULL_GPU)
     effort = small if options.quick else large
@@ -190,6 +192,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "machine": machine,
         "device": device_name(device),
         "versions": common.versions("robocasa-lerobot", "lerobot", "torch", "torchcodec", "av", "accelerate"),
+        "lerobot_decodes_with": get_safe_default_video_backend(),
         "dataset": describe_dataset(dataset, kind),
         "ratios": training_report.ratios(training, loaders),
         "training": training,

@@ -192,7 +192,7 @@ def example_result() -> dict[str, Any]:
     }
     return {
         "mode": "quick", "machine": common.machine(), "device": "cpu",
-        "versions": {"lerobot": "0", "commit": "unknown"},
+        "versions": {"lerobot": "0", "commit": "unknown"}, "lerobot_decodes_with": "pyav",
         "dataset": {"kind": "made-up", "episodes": 2, "frames": 32, "cameras": {}},
         "ratios": report.ratios(training, loaders), "training": training, "loaders": loaders,
         "others_share_of_cores": common.spread([0.3]), "effort": {**dataclasses.asdict(speed.QUICK), "workers": [0, 2]},
@@ -239,6 +239,8 @@ def test_results_are_written_whole_and_reported(tmp_path: Path) -> None:
     assert re.search(r"demo_same_loader +0\.95 +>= 1 +NOT MET", text)
     assert re.search(r"demo_cached +2\.00 +>= 1\.3 +met", text)
     assert "NOT QUIET" in text
+    assert "LeRobot decodes with pyav, since torchcodec finds no FFmpeg." in text
+    assert "decodes with torchcodec.\n" in report({**example_result(), "lerobot_decodes_with": "torchcodec"})
     assert "waits 20.0% of the time" not in text  # a promise about GPUs
     assert "waits 20.0% of the time (wanted: at most 10%), NOT MET" in report({**example_result(), "device": "a GPU"})
 
