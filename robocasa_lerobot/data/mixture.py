@@ -21,7 +21,7 @@ from robocasa_lerobot.data.alike import check_alike, unseen_pictures
 from robocasa_lerobot.data.members import with_frames
 from robocasa_lerobot.data.mixture_config import LoaderConfig, MemberConfig, MixtureConfig
 from robocasa_lerobot.data.reading.decisions import frame_pool
-from robocasa_lerobot.data.reading.frame_cache import FrameCache, cache_bytes, open_or_build, resize_images
+from robocasa_lerobot.data.reading.frame_cache import FrameCache, cache_bytes, open_or_build
 from robocasa_lerobot.data.reading.pictures import PictureReader
 from robocasa_lerobot.data.reading.source import DatasetSource
 from robocasa_lerobot.data.reading.windows import Bounds
@@ -290,7 +290,7 @@ class MixtureDataset(torch.utils.data.Dataset[Item]):
                 out[key] = cache.frames(key, indices)
             else:
                 size = self._picture_size or self._feature_size()
-                images = resize_images(self._pictures.frames(source, key, indices.ravel()), size)
+                images = self._pictures.frames(source, key, indices.ravel(), size)
                 out[key] = images.reshape(*indices.shape, *images.shape[-3:])
             if padded is not None:
                 out[f"{key}_is_pad"] = torch.from_numpy(padded)

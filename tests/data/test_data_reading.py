@@ -13,6 +13,7 @@ import pytest
 import torch
 from lerobot.datasets.lerobot_dataset import LeRobotDataset
 from lerobot.datasets.video_utils import decode_video_frames
+from torchvision.transforms import v2
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.data.fake import write_fake_dataset
@@ -20,6 +21,7 @@ from robocasa_lerobot.data.mixture import MixtureDataset, StepBatches
 from robocasa_lerobot.data.mixture_config import LoaderConfig, MemberConfig, MixtureConfig
 from robocasa_lerobot.data.reading.column_file import map_columns
 from robocasa_lerobot.data.reading.pictures import PictureReader
+from robocasa_lerobot.data.reading.resize import AT_ONCE, resize_images
 from robocasa_lerobot.data.reading.source import DatasetSource
 from robocasa_lerobot.data.reading.video_reader import VideoReader
 from robocasa_lerobot.errors import UnknownNameError, UserError
@@ -86,12 +88,28 @@ def test_pictures_of_the_end_of_the_video_do_not_end_reading(root: Path) -> None
 def test_frames_of_several_episodes_come_as_asked(root: Path) -> None:
     source, reader = DatasetSource(root), PictureReader(2)
     indices = np.array([119, 0, 30, 29, 0, 65, 31])
-    pictures = reader.frames(source, KEY, indices)
+    pictures = reader.frames(source, KEY, indices, (32, 32))
+    assert pictures.is_contiguous()
     for index, picture in zip(indices, pictures, strict=True):
         episode = int(index) // 30
         path, start = source.video(episode, KEY)
         at = start + (int(index) - 30 * episode) / 20
         assert torch.equal(picture, decode_video_frames(path, [at], 1e-4, backend="pyav", return_uint8=True)[0])
+
+
+@pytest.mark.parametrize("size", [(16, 16), (24, 20), (48, 48), (32, 32)])
+def test_pictures_are_resized_alike_one_by_one_and_together(size: tuple[int, int]) -> None:
+    """As torchvision does, to the byte, in whichever order the bytes of a picture lie."""
+    pictures = torch.randint(
+        0, 256, (2 * AT_ONCE + 1, 3, 32, 32), dtype=torch.uint8, generator=torch.Generator().manual_seed(0)
+    )
+    wanted = v2.functional.resize(pictures.float(), list(size), antialias=True).round().clamp(0, 255).to(torch.uint8)
+    last = pictures.permute(0, 2, 3, 1).contiguous().permute(0, 3, 1, 2)
+    for images in (pictures, last):
+        assert torch.equal(resize_images(images, size), wanted)
+        assert torch.equal(torch.stack([resize_images(one, size) for one in images]), wanted)
+    together = resize_images(pictures[None], size)
+    assert torch.equal(together[0], wanted)
 
 
 def test_damaged_and_short_videos_are_told(root: Path, tmp_path: Path) -> None:

@@ -24,6 +24,7 @@ from lerobot.datasets.video_utils import decode_video_frames
 from numpy.typing import NDArray
 
 from robocasa_lerobot.data.reading.cache_disk import check_disk
+from robocasa_lerobot.data.reading.resize import resize_images
 from robocasa_lerobot.data.reading.source import DatasetSource
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.files import write_text
@@ -35,15 +36,6 @@ FORMAT = 1  # counted up when the content of a cache changes
 _BLOCK = 512  # bytes of the unit of `st_blocks`, whatever the file system's own is
 _AHEAD = 4000  # frames of each camera, 0.8 GB before they are made smaller
 _TOLERANCE_S = 1e-4  # LeRobot's tolerance between the asked and the decoded timestamp
-
-
-def resize_images(images: torch.Tensor, size: tuple[int, int]) -> torch.Tensor:
-    """Uint8 images (..., 3, H, W) at (height, width) `size`, bilinear with antialiasing as torchvision's Resize."""
-    if tuple(images.shape[-2:]) == tuple(size):
-        return images
-    flat = images.reshape(-1, *images.shape[-3:]).float()
-    out = torch.nn.functional.interpolate(flat, size=size, mode="bilinear", antialias=True, align_corners=False)
-    return out.round().clamp(0, 255).to(torch.uint8).reshape(*images.shape[:-2], *size)
 
 
 def cache_bytes(source: DatasetSource, keys: Sequence[str], size: tuple[int, int]) -> int:

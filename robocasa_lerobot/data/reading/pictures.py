@@ -11,10 +11,11 @@ import torch
 from lerobot.datasets.lerobot_dataset import LeRobotDataset
 from numpy.typing import NDArray
 
+from robocasa_lerobot.data.reading.resize import AT_ONCE, resize_images
 from robocasa_lerobot.data.reading.source import DatasetSource
 from robocasa_lerobot.data.reading.video_reader import VideoReader
 
-_FAR = 10  # frames; about a group of pictures in the videos that our converter writes
+_FAR = 4  # frames; key frames are 2 apart in the videos that our converter and LeRobot write
 _MAX_LEROBOT = 8  # of LeRobot's datasets; each takes seconds to open and keeps its tables
 
 
@@ -25,8 +26,10 @@ class PictureReader:
         self.videos = VideoReader(max_open)
         self._others: OrderedDict[Path, LeRobotDataset] = OrderedDict()
 
-    def frames(self, source: DatasetSource, key: str, indices: NDArray[np.int64]) -> torch.Tensor:
-        """The frames of the dataset with the given indices (n,): (n, 3, height, width), uint8.
+    def frames(
+        self, source: DatasetSource, key: str, indices: NDArray[np.int64], size: tuple[int, int]
+    ) -> torch.Tensor:
+        """The frames of the dataset with the given indices (n,) at (height, width) `size`: (n, 3, *size), uint8.
 
         Raises:
             UserError: a video cannot be read.
@@ -35,17 +38,23 @@ class PictureReader:
         feature = source.features[key]
         if feature["dtype"] != "video":
             others = self._lerobot(source)
-            pictures = torch.stack([others[int(index)][key] for index in distinct])[torch.from_numpy(back)]
             # LeRobot gives pictures that are stored singly as floats, whatever it is asked for.
-            return pictures.mul(255).round().to(torch.uint8)
-        parts = []
+            singly = (others[int(index)][key].mul(255).round().to(torch.uint8) for index in distinct)
+            return torch.stack([resize_images(picture, size) for picture in singly])[torch.from_numpy(back)]
+        parts: list[torch.Tensor] = []
+        read: list[torch.Tensor] = []  # and not resized yet
         episodes = np.searchsorted(source.ends, distinct, side="right")
         for episode in np.unique(episodes):
             inside = distinct[episodes == episode] - source.starts[episode]
             path, start = source.video(int(episode), key)
             for run in _runs(inside):
-                parts.append(self.videos.frames(path, start + run / source.fps))
-        return torch.cat(parts)[torch.from_numpy(back)]
+                read.append(self.videos.frames(path, start + run / source.fps))
+                if sum(map(len, read)) >= AT_ONCE:
+                    parts.append(resize_images(torch.cat(read), size))
+                    read = []
+        if read:
+            parts.append(resize_images(torch.cat(read), size))
+        return torch.cat(parts)[torch.from_numpy(back)].contiguous()
 
     def _lerobot(self, source: DatasetSource) -> LeRobotDataset:
         root = source.root

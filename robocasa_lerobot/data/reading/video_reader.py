@@ -31,7 +31,8 @@ class VideoReader:
     def frames(self, path: Path, times: NDArray[np.float64]) -> torch.Tensor:
         """The pictures at `times` (n,), in seconds, of any order and with repeats: uint8 (n, 3, height, width).
 
-        Decoded as LeRobot's PyAV reader does, to equal bytes.
+        Decoded as LeRobot's PyAV reader does, to equal bytes, and left in the order of the decoder's: each pixel's
+        colours together.
 
         Raises:
             UserError: the file cannot be read, or has no picture at one of the times.
@@ -45,7 +46,7 @@ class VideoReader:
         missing = [t for t in wanted if t not in found]
         if missing:
             raise UserError(f"{path}: no picture at {missing[0]:.4f} s. Run `robocasa-lerobot verify`.")
-        return torch.from_numpy(np.stack([found[float(t)] for t in times])).permute(0, 3, 1, 2).contiguous()
+        return torch.from_numpy(np.stack([found[float(t)] for t in times])).permute(0, 3, 1, 2)
 
     def close(self) -> None:
         """Close all files."""
@@ -76,7 +77,10 @@ class VideoReader:
         if path not in self._open:
             while len(self._open) >= self.max_open:
                 self._close(next(iter(self._open)))
-            self._open[path] = av.open(str(path))
+            container = av.open(str(path))
+            # Threads gain nothing on single small pictures, and wait for each other where cores are busy.
+            container.streams.video[0].codec_context.thread_count = 1
+            self._open[path] = container
         self._open.move_to_end(path)
         return self._open[path]
 
