@@ -104,6 +104,11 @@ SENTENCES: list[tuple[str, str, list[str]]] = [
     (
         r"([\d.]+) times as many samples a second with .{,20}, ([\d.]+) times with ours, and ([\d.]+) times where",
         "training_speed.json",
+        [f"ratios/demo_of_64_{how}" for how in ("same_loader", "decoding", "cached")],
+    ),
+    (
+        r"default batches of 8 ([\d.]+), ([\d.]+) and ([\d.]+) times",
+        "training_speed.json",
         [f"ratios/demo_{how}" for how in ("same_loader", "decoding", "cached")],
     ),
     (
