@@ -82,6 +82,8 @@ def test_rates_are_means_over_tasks_and_seeds() -> None:
     assert difference(many, [], SETS["both"]) is None
     first = [pair for pair in few if pair[0] == 0]
     assert difference(many, first, SETS["both"]) is None, "more trainings than the other"
+    one = [pair for pair in many if pair[0] == 0]
+    assert difference(one, few, SETS["both"]) == difference(one, first, SETS["both"]), "of as many trainings as it has"
     assert failure_terms(few)[0] == ("B", "open", 8)
 
 
