@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -61,11 +61,12 @@ def costs(
     cores: int,
     measured_steps: int,
     at_once: int,
-    left: Mapping[Run, Collection[str]],
+    left: Mapping[Run, Mapping[str, bool]],
 ) -> dict[str, Cost]:
     """What each part takes; `runs` are those of each part that no earlier part has and that have not ended.
 
-    `left` are the phases of each that are still to be run. Data are those of all its phases, as they are made.
+    `left` are the phases of each that are still to be run, and whether they are to be tried. Data are those of all its
+    phases, as they are made.
 
     Trainings are measured with the threads that each of `at_once` has beside the others, and alone: they share caches
     and memory as well, so that two of the demo's policy take 6 % longer than that.
@@ -139,14 +140,15 @@ class _Plan:
 
 
 def _planned(
-    run: Run, pixels: int | None, measured_steps: int, measured: dict[str, float | str], wanted: Collection[str]
+    run: Run, pixels: int | None, measured_steps: int, measured: dict[str, float | str], wanted: Mapping[str, bool]
 ) -> _Plan:
     sizes = () if pixels is None else (f"--loader.image_size={pixels}",)
     experiment = run.loaded(sizes)
     needs, _ = needs_of(experiment, parse_episodes(run.episodes) if run.episodes else {})
     phases = plan_experiment(experiment, measured_steps=measured_steps, measured=measured)
     phases = [plan for plan in phases if plan.phase.name in wanted]
-    evaluations = plan_evaluations(experiment, [plan.phase for plan in phases if not plan.left_out])
+    tried = [plan.phase for plan in phases if wanted[plan.phase.name] and not plan.left_out]
+    evaluations = plan_evaluations(experiment, tried)
     left = [_share_left(run, item) for item in evaluations]
     return _Plan(
         [need for need in needs if need.missing],

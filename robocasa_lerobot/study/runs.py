@@ -7,7 +7,7 @@ import re
 import shutil
 import signal
 import tempfile
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from functools import cached_property
@@ -125,14 +125,14 @@ class Run:
         }
         return yaml.safe_dump(content, sort_keys=False)
 
-    def commands(self, workers: int | None, left: Collection[str] | None = None) -> list[list[str]]:
+    def commands(self, workers: int | None, left: Mapping[str, bool] | None = None) -> list[list[str]]:
         """Arguments of `robocasa-lerobot` that make its data, and then train each phase and try what it has learnt.
 
         Data come first, but for those that correct an earlier phase's policy, which come before the phase that asks.
 
         Args:
             workers: processes that make data; None is one for each core.
-            left: the phases that are still to be run; None is all.
+            left: the phases that are still to be run, and whether they are to be tried; None is all.
         """
         scale = [] if self.scale is None else [f"--scale={self.scale}"]
         made = [] if workers is None else [f"--workers={workers}"]
@@ -145,7 +145,8 @@ class Run:
                 continue
             if any(need.policy is not None for need in needs_of(self.config, phase=phase.name)[0]):
                 found.append(data)  # again: what corrects an earlier phase's policy can be made now
-            found.append(["train", f"--config_path={self.file}", f"--phase={phase.name}", "--evaluate", *scale])
+            tried = ["--evaluate"] * (left is None or left[phase.name])
+            found.append(["train", f"--config_path={self.file}", f"--phase={phase.name}", *tried, *scale])
         return found
 
     def carry_out(
@@ -153,15 +154,17 @@ class Run:
         workers: int | None,
         threads: int | None = None,
         data_alone: Callable[[], AbstractContextManager[None]] = nullcontext,
-        left: Collection[str] | None = None,
+        left: Mapping[str, bool] | None = None,
     ) -> Iterator[None]:
-        """Make its data, then train and try phase by phase, and come back after each; what is finished takes seconds.
+        """Make its data, then train and try phase by phase; what is finished takes seconds.
+
+        Comes back after each phase that is tried.
 
         Args:
             workers: processes that make data; None is one for each core.
             threads: of a training; None leaves it to torch.
             data_alone: entered while data are made, which other runs may need as well.
-            left: the phases that are still to be run; None is all.
+            left: the phases that are still to be run, and whether they are to be tried; None is all.
 
         Raises:
             StoppedError: one did not end well; its own message stands above.
@@ -171,7 +174,7 @@ class Run:
             making = command[0] == "data"
             with data_alone() if making else nullcontext():
                 self._run(command, threads_variable(None if making else threads))
-            if not making:
+            if "--evaluate" in command:
                 yield
 
     def _run(self, command: Sequence[str], environment: dict[str, str]) -> None:

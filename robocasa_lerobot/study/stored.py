@@ -160,11 +160,11 @@ def circumstances(about: Mapping[str, Any]) -> list[Mapping[str, Any]]:
     return [about, *about.get("earlier", [])]
 
 
-def phases_left(run: Run, results: Path) -> list[str]:
-    """The phases of a run that are still to be run: those that were not kept, and what these build on.
+def phases_left(run: Run, results: Path) -> dict[str, bool]:
+    """The phases of a run that are still to be run, in order, and whether they are to be tried.
 
-    What was kept needs no checkpoint any more; what a later phase starts from, or whose policy is corrected for it,
-    does: it is trained again where its folder is gone.
+    Those that were not kept are, and what these build on is trained: what was kept needs no checkpoint any more, but
+    what a later phase starts from, or whose policy is corrected for it, does. Its trials stay those that were kept.
     """
     about = _about(results, run)
     kept = about["steps"] if about is not None and stands_for(about, run) else {}
@@ -173,7 +173,7 @@ def phases_left(run: Run, results: Path) -> list[str]:
         if phase.name not in kept:
             left |= {phase.name, *(one.name for one in run.config.ancestors(phase))}
             left |= {need.policy.name for need in needs_of(run.config, phase=phase.name)[0] if need.policy is not None}
-    return [phase.name for phase in run.config.phases if phase.name in left]
+    return {phase.name: phase.name not in kept for phase in run.config.phases if phase.name in left}
 
 
 def is_stored(run: Run, results: Path) -> bool:

@@ -249,29 +249,32 @@ def test_what_was_kept_stays_where_its_folder_is_gone(tmp_path: Path) -> None:
     run.write_file()
     results = tmp_path / "results"
     steps, every = run.config.phases[0].steps, [phase.name for phase in run.config.phases]
-    assert files.phases_left(run, results) == every
+    assert files.phases_left(run, results) == dict.fromkeys(every, True)
     for name in every[:-2]:
         phase_with_trials(run.folder / name, steps, "study_validation")
     files.store(run, results)
-    left = ["phase1", "lora_phase2", "lora_phase3", "lora_phase4"]  # with what the two that are left build on
+    # With what the two that are left build on, whose trials are kept.
+    left = {"phase1": False, "lora_phase2": False, "lora_phase3": True, "lora_phase4": True}
     assert files.phases_left(run, results) == left
-    assert [words[2] for words in run.commands(1, left)[1:]] == [f"--phase={name}" for name in left]
+    assert [words[2:] for words in run.commands(1, left)[1:]] == [
+        [f"--phase={name}", *["--evaluate"] * tried] for name, tried in left.items()
+    ]
     shutil.rmtree(run.folder)
-    phase_with_trials(run.folder / "phase1", steps, "study_validation")
+    phase_with_trials(run.folder / "phase1", steps, "study_validation", finished=False)
+    phase_with_trials(run.folder / "lora_phase3", steps, "study_validation")
     for _ in range(2):  # the second time there is nothing new
         files.store(run, results)
         found = read_stored(results, "lifelong", 1)
         assert found is not None
-        assert found.phases == tuple(every[:-2])
-        assert [trial.phase for trial in found.trials] == sorted(every[:-2])
-        assert found.about["phases"] == ["phase1"]
+        assert found.phases == tuple(every[:-1])
+        assert [trial.phase for trial in found.trials] == sorted(every[:-1])
+        assert found.about["phases"] == ["lora_phase3"]
         hours = [about["training_hours"] for about in files.circumstances(found.about)]
         assert hours == [pytest.approx(steps * 0.1 * trained / 3600, abs=0.001) for trained in (1, len(every) - 2)]
-    for name in left:
-        phase_with_trials(run.folder / name, steps, "study_validation")
+    phase_with_trials(run.folder / "lora_phase4", steps, "study_validation")
     files.store(run, results)
     assert files.is_stored(run, results)
-    assert files.phases_left(run, results) == []
+    assert files.phases_left(run, results) == {}
 
 
 def test_a_policy_that_is_corrected_is_trained_again_where_it_is_gone(tmp_path: Path) -> None:
@@ -282,7 +285,7 @@ def test_a_policy_that_is_corrected_is_trained_again_where_it_is_gone(tmp_path: 
         if phase.name != "corrected":
             phase_with_trials(run.folder / phase.name, phase.steps, "study_target")
     files.store(run, results)
-    assert files.phases_left(run, results) == ["train", "corrected"]
+    assert files.phases_left(run, results) == {"train": False, "corrected": True}
 
 
 def test_a_run_without_a_device_of_its_own_is_of_the_machine_s(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
