@@ -8,6 +8,7 @@ import queue
 import socket
 import threading
 import time
+import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -34,6 +35,7 @@ CODES = {"Space": " ", "Backspace": "Backspace", "Enter": "Enter"}
 # After which a gesture that shows nothing is made again, as people do: on a busy machine the page lets go of everything
 # where a picture is late, which is what it is for.
 AGAIN_S = 5.0
+CLICKS = 3  # without an effect, after which a page is loaded again between tests
 
 
 class Page:
@@ -57,6 +59,17 @@ class Page:
         """The grip site in the world, from the simulation."""
         data: mujoco.MjData = self.session.env.data
         return np.array(data.site(GRIP_SITE).xpos)
+
+    def told(self) -> str:
+        """What page and session are at, for who reads of a failure."""
+        at = self.browser.ask(
+            "[document.body.dataset.phase, document.body.dataset.locked, document.querySelector('dialog[open]')?.id,"
+            "document.activeElement.id, document.querySelector('#g-step').textContent, innerHeight, scrollY,"
+            "JSON.stringify(document.querySelector('#redo').getBoundingClientRect()), "
+            "(r => document.elementFromPoint(r.x + r.width / 2, r.y + r.height / 2)?.outerHTML.slice(0, 200))"
+            "(document.querySelector('#redo').getBoundingClientRect())]"
+        )
+        return f"page {at}, session {self.session.phase}, {self.session.pause}, {self.browser.messages}"
 
     def text(self, selector: str) -> str:
         """What an element says."""
@@ -144,14 +157,19 @@ class Page:
         """The same kitchen from its start, with nothing held."""
         if self.phase == "ready":
             return
-        scenes = self.session.scenes
+        scenes, clicks = self.session.scenes, 0
         deadline, again = time.monotonic() + WAIT_S, 0.0
         while self.session.scenes == scenes or self.phase != "ready":
-            assert time.monotonic() < deadline, f"no fresh kitchen: {self.phase}, {self.browser.messages}"
+            assert time.monotonic() < deadline, f"no fresh kitchen: {self.told()}"
             if self.browser.ask("document.querySelector('#leave-dialog').open"):
                 self.click("#leave-ok")
             elif self.session.scenes == scenes and time.monotonic() > again:
+                if clicks == CLICKS:
+                    warnings.warn(f"the page was loaded again: {self.told()}", stacklevel=2)
+                    self.browser.open(self.browser.ask("location.href"))
+                    self.browser.until("['running', 'paused', 'review'].includes(document.body.dataset.phase)", WAIT_S)
                 self.click("#redo" if self.phase not in ("review", "saving") else "#review-redo")
+                clicks += 1
                 again = time.monotonic() + AGAIN_S
             time.sleep(0.05)
 
