@@ -79,9 +79,7 @@ def costs(
     measured: dict[str, float | str] = {}
     recorded: set[Path] = set()
     # Other seeds need the same data and take as long, where they have not begun.
-    begun = {
-        run for own in runs.values() for run in own if run.folder.exists() or len(left[run]) < len(run.config.phases)
-    }
+    begun = {run for run, phases in left.items() if run.folder.exists() or len(phases) < len(run.config.phases)}
     kinds = {run: run.name if run in begun else run.experiment for own in runs.values() for run in own}
     plans: dict[str, _Plan] = {}
     total = len(set(kinds.values()))

@@ -24,7 +24,7 @@ from robocasa_lerobot.jobs.child_process import run_command
 from robocasa_lerobot.making.needs import needs_of
 from robocasa_lerobot.settings import load_yaml
 from robocasa_lerobot.study.settings import EXPERIMENTS, PartConfig, StudyConfig
-from robocasa_lerobot.training.config.experiment import ExperimentConfig, load_experiment
+from robocasa_lerobot.training.config.experiment import ExperimentConfig, PhaseConfig, load_experiment
 
 CPU, CUDA = "cpu", "cuda"
 DEVICES = (CPU, CUDA)
@@ -125,6 +125,11 @@ class Run:
         }
         return yaml.safe_dump(content, sort_keys=False)
 
+    def corrected_for(self, phase: PhaseConfig) -> set[str]:
+        """Names of the phases whose policies are corrected for the data of this one."""
+        needs, _ = needs_of(self.config, phase=phase.name)
+        return {need.policy.name for need in needs if need.policy is not None}
+
     def commands(self, workers: int | None, left: Mapping[str, bool] | None = None) -> list[list[str]]:
         """Arguments of `robocasa-lerobot` that make its data, and then train each phase and try what it has learnt.
 
@@ -143,7 +148,7 @@ class Run:
         for phase in self.config.phases:
             if left is not None and phase.name not in left:
                 continue
-            if any(need.policy is not None for need in needs_of(self.config, phase=phase.name)[0]):
+            if self.corrected_for(phase):
                 found.append(data)  # again: what corrects an earlier phase's policy can be made now
             tried = ["--evaluate"] * (left is None or left[phase.name])
             found.append(["train", f"--config_path={self.file}", f"--phase={phase.name}", *tried, *scale])

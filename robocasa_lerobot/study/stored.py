@@ -16,7 +16,6 @@ from typing import Any
 from robocasa_lerobot.errors import UserError, differing
 from robocasa_lerobot.evaluation.records.results import UNPERTURBED, TrialRecord, read_results
 from robocasa_lerobot.files import write_text, written_aside
-from robocasa_lerobot.making.needs import needs_of
 from robocasa_lerobot.provenance import git_commit, machine, utc_now, versions
 from robocasa_lerobot.settings import load_yaml
 from robocasa_lerobot.study.runs import CPU, Run
@@ -171,8 +170,7 @@ def phases_left(run: Run, results: Path) -> dict[str, bool]:
     left: set[str] = set()
     for phase in run.config.phases:
         if phase.name not in kept:
-            left |= {phase.name, *(one.name for one in run.config.ancestors(phase))}
-            left |= {need.policy.name for need in needs_of(run.config, phase=phase.name)[0] if need.policy is not None}
+            left |= {phase.name, *(one.name for one in run.config.ancestors(phase)), *run.corrected_for(phase)}
     return {phase.name: phase.name not in kept for phase in run.config.phases if phase.name in left}
 
 

@@ -89,18 +89,14 @@ class Page:
         """Wait until so many more control steps have been carried out."""
         episode = self.session.driven
         last = len(episode) + count
-        deadline = time.monotonic() + WAIT_S
-        while len(episode) < last:
-            assert time.monotonic() < deadline, f"time stands: {self.phase}, {self.text('#veil')}"
-            self.go_on()
-            time.sleep(0.01)
+        self.wait(lambda: len(episode) >= last)
 
     def gesture(self, begin: Callable[[], object], end: Callable[[], object], shows: Callable[[], object]) -> None:
         """Begin something and go on with it until it shows, however long commands take on this machine; then end it."""
         deadline = time.monotonic() + WAIT_S
         shown = False
         while not shown:
-            assert time.monotonic() < deadline, f"nothing to be seen of it: {self.phase}, {self.text('#veil')}"
+            assert time.monotonic() < deadline, f"nothing to be seen of it: {self.told()}"
             self.go_on()
             begin()
             try:
@@ -111,10 +107,11 @@ class Page:
                 end()
 
     def wait(self, shows: Callable[[], object]) -> None:
-        """Wait until something shows."""
+        """Wait until something shows; where time stands since a picture was late, it is run again."""
         deadline = time.monotonic() + WAIT_S
         while not shows():
-            assert time.monotonic() < deadline, f"nothing to be seen of it: {self.phase}, {self.text('#veil')}"
+            assert time.monotonic() < deadline, f"nothing to be seen of it: {self.told()}"
+            self.go_on()
             time.sleep(0.01)
 
     def go_on(self) -> None:
