@@ -127,3 +127,22 @@ def test_a_picture_stays_large_when_the_line_is_there_again(page: Page) -> None:
     browser.ask(f"document.querySelector({PICTURE + ' .tile-large'!r}).click()")
     assert not browser.ask("document.querySelector('.one-large')")
     browser.messages.clear()
+
+
+def test_words_that_are_selected_and_dragged_leave_the_mouse_to_the_page(page: Page) -> None:
+    """The browser's own drag of them would end every gesture."""
+    browser = page.browser
+    browser.ask("window.ended = 0, addEventListener('pointercancel', () => window.ended++, true)")
+    browser.ask("getSelection().selectAllChildren(document.querySelector('#instruction'))")
+    left, top, _, height = browser.box("#instruction")
+    x, y = left + 20, top + height / 2
+    browser.mouse("mousePressed", x, y)
+    for away in (2, 5, 15, 40, 80):
+        browser.mouse("mouseMoved", x + away, y + away)
+        time.sleep(0.05)
+    browser.mouse("mouseReleased", x + 80, y + 80)
+    assert browser.ask("ended") == 0
+    page.click("#mode [data-value=base]")
+    browser.until("document.querySelector('#mode [data-value=base]').ariaChecked === 'true'")
+    page.click("#mode [data-value=arm]")
+    browser.until("document.querySelector('#mode [data-value=arm]').ariaChecked === 'true'")

@@ -189,6 +189,8 @@ addEventListener("blur", lostFocus);
 addEventListener("focus", () => send({ type: "focus", on: true }));
 document.addEventListener("visibilitychange", () => document.hidden && lostFocus());
 addEventListener("pagehide", lostFocus);
+// Words that were selected would be dragged by the browser, which then has the mouse and ends every gesture.
+addEventListener("dragstart", (event) => event.preventDefault());
 for (const [id, type] of [["policy-start", "start"], ["take-over", "take_over"], ["give-back", "give_back"], ["take", "take"]]) {
   $(id).addEventListener("click", () => send({ type }));
 }
