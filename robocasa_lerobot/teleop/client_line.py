@@ -29,6 +29,7 @@ class ClientLine:
         self._texts: collections.deque[str] = collections.deque()
         self._picture: tuple[int, bytes] | None = None
         self._sent: collections.OrderedDict[int, float] = collections.OrderedDict()
+        self._answered_in = 0.0
         self._wake = asyncio.Event()
 
     @property
@@ -49,12 +50,16 @@ class ClientLine:
     def acknowledge(self, number: int) -> None:
         """The client has drawn a picture, and needs none before it any more."""
         for sent in [sent for sent in self._sent if sent <= number]:
-            del self._sent[sent]
+            self._answered_in = time.monotonic() - self._sent.pop(sent)
         self._wake.set()
 
     def overdue(self, seconds: float) -> bool:
         """Whether a picture has waited for its acknowledgement for so long."""
         return bool(self._sent) and time.monotonic() - next(iter(self._sent.values())) > seconds
+
+    def late(self, seconds: float) -> bool:
+        """Whether a picture waits, or the last one that was acknowledged has waited, for so long."""
+        return self._answered_in > seconds or self.overdue(seconds)
 
     async def send(self) -> None:
         """Send for as long as the client is there."""

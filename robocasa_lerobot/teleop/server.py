@@ -121,7 +121,9 @@ class TeleopServer:
 
     def _spread_frame(self, told: dict[str, Any], pictures: list[bytes]) -> None:
         viewers = len(self._lines) - (self._operator is not None)
-        message = pack_frame({**told, "operator": self._operator is not None, "viewers": viewers}, pictures)
+        late = self._operator is not None and self._operator.late(STALE_S)
+        driven = {"operator": self._operator is not None, "late": late}
+        message = pack_frame({**told, **driven, "viewers": viewers}, pictures)
         for line in self._lines:
             line.show(told["id"], message)
         self._count()

@@ -55,6 +55,11 @@ class Page:
         return self.session.phase == "paused" and self.session.pause == "stale"
 
     @property
+    def offers_to_go_on(self) -> bool:
+        """Whether the button over the pictures is there."""
+        return bool(self.browser.ask("document.querySelector('#veil-button').checkVisibility()"))
+
+    @property
     def hand(self) -> NDArray[np.float64]:
         """The grip site in the world, from the simulation."""
         data: mujoco.MjData = self.session.env.data
@@ -82,8 +87,13 @@ class Page:
             self.browser.mouse(kind, left + width / 2, top + height / 2)
 
     def until(self, phase: str) -> None:
-        """Wait for a phase."""
-        self.browser.until(f"document.body.dataset.phase === {phase!r}", WAIT_S)
+        """Wait for a phase; for time to run also where a picture is late meanwhile."""
+        deadline = time.monotonic() + WAIT_S
+        while self.phase != phase:
+            assert time.monotonic() < deadline, f"not {phase}: {self.told()}"
+            if phase == "running":
+                self.go_on()
+            time.sleep(0.1)
 
     def steps(self, count: int) -> None:
         """Wait until so many more control steps have been carried out."""
@@ -115,11 +125,14 @@ class Page:
             time.sleep(0.01)
 
     def go_on(self) -> None:
-        """Where time stands since a picture was late, have it run."""
-        if self.late:
-            self.browser.until("document.querySelector('#veil-button').checkVisibility()", WAIT_S)
-            self.click("#veil-button")
-            self.until("running")
+        """Where time stands since a picture was late, have it run; and again where one is late meanwhile."""
+        deadline, again = time.monotonic() + WAIT_S, 0.0
+        while self.late:
+            assert time.monotonic() < deadline, f"it does not go on: {self.told()}"
+            if time.monotonic() > again and self.offers_to_go_on:
+                self.click("#veil-button")
+                again = time.monotonic() + AGAIN_S
+            time.sleep(0.05)
 
     def hold_until(self, code: str, shows: Callable[[], object]) -> None:
         """Hold a key until what it is for shows."""

@@ -176,9 +176,10 @@ def test_who_has_long_answered_no_picture_cannot_have_time_run(session: Served, 
         shown = viewer.frame["id"]
         operator.send("resume")
         viewer.until(lambda: viewer.frame["id"] > shown + 3)
-        assert (viewer.frame["phase"], viewer.frame["pause"]) == ("paused", "stale")
+        assert (viewer.frame["phase"], viewer.frame["pause"], viewer.frame["late"]) == ("paused", "stale", True)
         operator._acknowledges = True
         operator.send("ack", frame=operator.frame["id"])
+        operator.until(lambda: not operator.frame["late"])
         go_on(operator)
 
 
