@@ -146,3 +146,26 @@ def test_words_that_are_selected_and_dragged_leave_the_mouse_to_the_page(page: P
     browser.until("document.querySelector('#mode [data-value=base]').ariaChecked === 'true'")
     page.click("#mode [data-value=arm]")
     browser.until("document.querySelector('#mode [data-value=arm]').ariaChecked === 'true'")
+
+
+def test_a_second_click_on_the_button_over_the_pictures_sends_the_hand_nowhere(page: Page) -> None:
+    page.hold("KeyR", 3)
+    page.click("#pause")
+    page.until("paused")
+    reached = page.browser.ask(
+        """
+        (async () => {
+          const button = document.querySelector("#veil-button");
+          const { x, y, width, height } = button.getBoundingClientRect();
+          const at = { clientX: x + width / 2, clientY: y + height / 2, pointerId: 1, bubbles: true };
+          button.click();
+          while (button.checkVisibility()) await new Promise(requestAnimationFrame);
+          const behind = document.elementFromPoint(at.clientX, at.clientY);
+          for (const kind of ["pointerdown", "pointerup"]) behind.dispatchEvent(new PointerEvent(kind, at));
+          return behind.tagName;
+        })()
+        """
+    )
+    assert reached == "CANVAS"
+    page.steps(6)
+    assert not any(origin.assisted for origin in page.session.driven.origins)

@@ -176,7 +176,9 @@ function watch() {
   operator.lock(!state.line ? "no line" : age || stale ? "stale" : "");
   document.body.dataset.locked = operator.locked;
   $("dot").dataset.state = !state.line ? "off" : age || stale ? "late" : "on";
+  const offered = !$("veil-button").hidden;
   panel.veil(state.head, { age, line: state.line });
+  if (offered && $("veil-button").hidden) tiles.quiet(); // whoever clicks it twice hits the picture behind it
 }
 
 function lostFocus() {

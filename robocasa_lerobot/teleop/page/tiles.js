@@ -11,7 +11,7 @@ const NAMES = {
 const CLICK_PX = 5; // less than that is a click, not a drag
 const FULL_PX = 90; // pointer this far from where it went down: full speed
 const NOTCH_S = 0.18; // how long one notch of the wheel moves the hand
-const FOCUS_CLICK_MS = 400; // a click that only brought the window back is not meant for the robot
+const QUIET_MS = 400; // a click that only brought the window back, or that was meant for "Go on", is not meant for the robot
 
 export class Tiles {
   /** `on` has drag(camera, {left, up} or null), depth(camera, sign), orbit(dx, dy), zoom(factor), point(camera, u, v). */
@@ -20,8 +20,13 @@ export class Tiles {
     this.on = on;
     this.tiles = new Map();
     this.newest = new Map();
-    this.focused = 0;
-    addEventListener("focus", () => (this.focused = performance.now()));
+    this.quietFrom = -QUIET_MS;
+    addEventListener("focus", () => this.quiet());
+  }
+
+  /** Clicks of the next moment ask for nothing. */
+  quiet() {
+    this.quietFrom = performance.now();
   }
 
   setUp(cameras) {
@@ -99,7 +104,7 @@ export class Tiles {
     canvas.addEventListener("pointerdown", (event) => {
       if (event.button !== 0) return;
       start = { x: event.clientX, y: event.clientY, px: event.clientX, py: event.clientY };
-      start.idle = performance.now() - this.focused < FOCUS_CLICK_MS;
+      start.idle = performance.now() - this.quietFrom < QUIET_MS;
       moved = false;
       this.drop = end;
       canvas.setPointerCapture(event.pointerId);
