@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import re
+import types
 import typing
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -58,7 +59,7 @@ def load_yaml(path: Path) -> Data:
         ConfigError: no such file (the closest names are listed), not YAML, or not a mapping.
     """
     if not path.is_file():
-        names = [p.name for p in path.parent.glob("*.yaml")] if path.parent.is_dir() else []
+        names = [p.name for p in path.parent.glob("[!.]*.yaml")] if path.parent.is_dir() else []
         raise ConfigError(f"no file {path}. {suggest(path.name, names) if names else 'Its folder has no YAML files.'}")
     try:
         content = yaml.load(path.read_text(encoding="utf-8"), Loader=_Loader)
@@ -119,30 +120,64 @@ def set_dotted(data: Data, dotted: str, value: Any) -> None:
         here[last] = value
 
 
-def check_keys(kind: type, data: Any, where: str) -> None:
+def check_keys(kind: type, data: Any, where: str, path: str = "") -> None:
     """Check that mappings have only keys that the dataclass `kind` (and those inside it) knows.
+
+    And that what must be a mapping or a list is one, and a number no truth value, which draccus says in words of its
+    own, or takes. `where` is the file, `path` the place in it.
 
     Raises:
         UnknownNameError: the first unknown key, with the closest match.
+        ConfigError: another kind of value.
     """
     if not dataclasses.is_dataclass(kind) or not isinstance(data, Mapping):
         return
     hints = typing.get_type_hints(kind)
     for key, value in data.items():
         if key not in hints:
-            raise UnknownNameError("key", str(key), hints, f"(in {where})")
+            raise UnknownNameError("key", str(key), hints, f"(in `{path}` of {where})" if path else f"(in {where})")
+        below = f"{path}.{key}" if path else str(key)
+        _check_kind(hints[key], value, below, where)
         inside = next(iter(_dataclasses_in(hints[key])), None)
         if inside is None:
             continue
         if isinstance(value, list):
             for number, item in enumerate(value):
                 name = item.get("name", number) if isinstance(item, Mapping) else number
-                check_keys(inside, item, f"{where}.{key}.{name}")
+                _check_kind(inside, item, f"{below}.{name}", where)
+                check_keys(inside, item, where, f"{below}.{name}")
         elif typing.get_origin(hints[key]) is dict and isinstance(value, Mapping):
             for name, item in value.items():
-                check_keys(inside, item, f"{where}.{key}.{name}")
+                check_keys(inside, item, where, f"{below}.{name}")
         else:
-            check_keys(inside, value, f"{where}.{key}")
+            check_keys(inside, value, where, below)
+
+
+def _check_kind(hint: Any, value: Any, path: str, where: str) -> None:
+    """Check that a value is a mapping, a list or a number where its `hint` takes nothing else."""
+    options = typing.get_args(hint) if typing.get_origin(hint) in (typing.Union, types.UnionType) else (hint,)
+    if value is None and type(None) in options:
+        return
+    kinds = {_kind_of(option) for option in options if option is not type(None)}
+    found = Mapping if isinstance(value, Mapping) else list if isinstance(value, list | tuple) else type(value)
+    if None in kinds or found in kinds or (kinds & {int, float} and found is not bool):
+        return  # or draccus says what it expects
+    if list in kinds:
+        expected = "a list" if value is None or found is Mapping else f"a list, such as [{value}]"
+    elif Mapping in kinds:
+        names = next((", ".join(typing.get_type_hints(one)) for one in _dataclasses_in(hint)), "")
+        expected = f"a mapping of settings{': ' + names if names else ''}"
+    else:
+        expected = "a number"
+    raise ConfigError(f"{where}: `{path}` is {value!r}, expected {expected}.")
+
+
+def _kind_of(hint: Any) -> type | None:
+    """Of a type: `Mapping`, `list`, `int` or `float`; None for others."""
+    origin = typing.get_origin(hint)
+    if origin is dict or (isinstance(hint, type) and dataclasses.is_dataclass(hint)):
+        return Mapping
+    return list if origin in (list, tuple) else hint if hint in (int, float) else None
 
 
 def _dataclasses_in(hint: Any) -> list[type]:

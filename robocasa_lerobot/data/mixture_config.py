@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -139,6 +140,8 @@ class MixtureConfig:
     def __post_init__(self) -> None:
         if self.draw not in DRAWN:
             raise UnknownNameError("choice", self.draw, DRAWN, "(what a mixture may `draw` of a dataset)")
+        if not math.isfinite(self.alpha):
+            raise UserError(f"mixture: alpha is {self.alpha}, expected a number, such as 0.4 or 1.")
         parts: list[MemberConfig | SelectionConfig] = [*self.members, *self.select]
         if not parts:
             raise UserError(

@@ -214,7 +214,7 @@ def test_mistakes_in_selections_and_registries_are_told(tmp_path: Path) -> None:
     for content, message in (
         ({"dataset": []}, "Did you mean 'datasets'"),
         ({"datasets": [{"path": "a", "task": ["X"]}]}, "Did you mean 'tasks'"),
-        ({"datasets": ["a"]}, "expected mappings"),
+        ({"datasets": ["a"]}, "expected a mapping of settings: path"),
         ({"scheme": "robocasa"}, "Did you mean 'robocasa365'"),
     ):
         with pytest.raises(UserError, match=message):

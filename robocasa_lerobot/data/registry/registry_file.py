@@ -17,7 +17,6 @@ A registry file is YAML; every path counts from `root`, which counts from the wo
 from __future__ import annotations
 
 import copy
-import dataclasses
 import pickle
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -27,7 +26,7 @@ from typing import Any
 from robocasa_lerobot.data.mixture_config import ROBOCASA365
 from robocasa_lerobot.data.registry.recipes import RecipeConfig
 from robocasa_lerobot.errors import UnknownNameError, UserError
-from robocasa_lerobot.settings import Data, decode, load_yaml
+from robocasa_lerobot.settings import Data, check_keys, decode, load_yaml
 
 DEMONSTRATED = "demonstrated"  # value of `only`
 TASK = "{task}"  # in a `path`
@@ -113,11 +112,7 @@ def _load(path: Path, above: tuple[Path, ...]) -> Data:
         raise UserError(f"{path} is its own base, through {', '.join(p.name for p in above)}.")
     data = load_yaml(path)
     base = data.pop(_BASE, None)
-    _check_keys(RegistryConfig, data, path)
-    for item in data.get("datasets") or []:
-        _check_keys(RegisteredDataset, item, path)
-        if item.get("make") is not None:
-            _check_keys(RecipeConfig, item["make"], path)
+    check_keys(RegistryConfig, data, str(path))
     out: Data = {}
     layers = [_load(path.parent / str(name), (*above, path.resolve())) for name in _names(base)]
     for layer in (*layers, data):
@@ -129,12 +124,3 @@ def _load(path: Path, above: tuple[Path, ...]) -> Data:
 
 def _names(base: Any) -> list[Any]:
     return base if isinstance(base, list) else [] if base is None else [base]
-
-
-def _check_keys(kind: type, data: Any, path: Path) -> None:
-    known = {f.name for f in dataclasses.fields(kind)}
-    if not isinstance(data, dict):
-        raise UserError(f"{path}: found {data!r} in `datasets`, expected mappings with {sorted(known)}.")
-    for key in data:
-        if key not in known:
-            raise UnknownNameError("key", str(key), known, f"(in {path})")

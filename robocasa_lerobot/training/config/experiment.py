@@ -65,6 +65,8 @@ class ExperimentConfig:
             raise UserError(
                 f"experiment {self.name!r}: `policy` needs a `type`, a `file` or the `path` of a checkpoint."
             )
+        if self.seed < 0:
+            raise UserError(f"experiment {self.name!r}: seed is {self.seed}, expected 0 or more.")
         if self.mixed_precision == str(False):  # what YAML makes of a bare `no`
             self.mixed_precision = "no"
         check_choice("mixed_precision", self.mixed_precision, MIXED_PRECISION)

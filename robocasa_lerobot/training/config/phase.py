@@ -30,8 +30,9 @@ class EmaConfig:
     max_decay: float = 0.9999
 
     def __post_init__(self) -> None:
-        if not self.inv_gamma > 0:
-            raise UserError(f"ema: inv_gamma is {self.inv_gamma}, expected more than 0.")
+        for name in ("power", "inv_gamma"):  # with another power, no step would ever be averaged
+            if not 0 < getattr(self, name) < math.inf:
+                raise UserError(f"ema: {name} is {getattr(self, name)}, expected more than 0.")
         if not 0 <= self.min_decay <= self.max_decay <= 1:
             raise UserError(
                 f"ema: min_decay is {self.min_decay} and max_decay {self.max_decay}, expected 0 <= min_decay <= "
@@ -61,6 +62,8 @@ class LoraConfig:
     def __post_init__(self) -> None:
         if self.rank < 1:
             raise UserError(f"lora: rank is {self.rank}, expected at least 1.")
+        if self.alpha is not None and not math.isfinite(self.alpha):
+            raise UserError(f"lora: alpha is {self.alpha}, expected a number.")
         if not 0 <= self.dropout < 1:
             raise UserError(f"lora: dropout is {self.dropout}, expected at least 0 and below 1.")
 

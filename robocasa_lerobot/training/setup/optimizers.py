@@ -29,9 +29,14 @@ def check_optimizer(config: PreTrainedConfig, phase: PhaseConfig) -> None:
     Raises:
         UserError: a setting that they do not have, or a value that does not fit.
     """
-    preset = _optimizer_settings(config, phase)
-    stand_in = torch.optim.SGD([torch.nn.Parameter(torch.zeros(1))], lr=preset.lr)
-    _schedule(config, phase, stand_in)
+    preset, weight = _optimizer_settings(config, phase), torch.nn.Parameter(torch.zeros(1))
+    try:
+        stand_in = preset.build({"weight": weight} if preset.type in _BY_NAME else [weight])
+    except ValueError as error:  # of PyTorch, which names the value
+        raise UserError(f"phase {phase.name!r}: optimiser {preset.type!r}: {error}.") from error
+    if phase.learning_rate is not None and not preset.lr:
+        raise UserError(f"phase {phase.name!r}: learning_rate scales the policy's own rate, which is 0.")
+    _schedule(config, phase, _one_of(stand_in, config))
 
 
 def make_optimizer(
@@ -47,8 +52,7 @@ def make_optimizer(
     preset = _optimizer_settings(policy.config, phase)
     masters = MasterWeights(policy) if masters is None else masters
     optimizer = preset.build(masters.groups(_trained_groups(policy, phase, by_name=preset.type in _BY_NAME)))
-    if not isinstance(optimizer, torch.optim.Optimizer):
-        raise UserError(f"policy {policy.config.type!r} wants several optimisers, which training does not support.")
+    optimizer = _one_of(optimizer, policy.config)
     for group in optimizer.param_groups:
         # One kernel for all elements instead of a dozen: on a CPU the update is several times faster.
         if "fused" in group and policy.config.device == "cpu":
@@ -59,6 +63,12 @@ def make_optimizer(
             group["lr"] *= phase.learning_rate / preset.lr
     clip = preset.grad_clip_norm if phase.grad_clip_norm is None else phase.grad_clip_norm
     return optimizer, _schedule(policy.config, phase, optimizer), float(clip or 0.0)
+
+
+def _one_of(built: Any, config: PreTrainedConfig) -> torch.optim.Optimizer:
+    if not isinstance(built, torch.optim.Optimizer):
+        raise UserError(f"policy {config.type!r} wants several optimisers, which training does not support.")
+    return built
 
 
 def in_lerobots_words(config: PreTrainedConfig, phase: PhaseConfig) -> tuple[OptimizerConfig, LRSchedulerConfig | None]:
@@ -116,7 +126,8 @@ def _changed(registry: Any, preset: Any, changes: Mapping[str, Any], what: str) 
     kind = changes.get("type", preset.type if preset is not None else None)
     fields = {key: value for key, value in changes.items() if key != "type"}
     if kind not in registry.get_known_choices():
-        raise UnknownNameError(f"type of {what}", str(kind), [*registry.get_known_choices(), "none"])
+        none = ["none"] if what == "scheduler" else []
+        raise UnknownNameError(f"type of {what}", str(kind), [*registry.get_known_choices(), *none])
     chosen = registry.get_choice_class(kind)
     names = [f.name for f in dataclasses.fields(chosen)]
     for key in fields:
