@@ -43,7 +43,11 @@ def check_alike(sources: Sequence[DatasetSource], unseen: Collection[str], any_i
         for key in sorted((first.features.keys() | other.features.keys()) - set(unseen)):
             ours, theirs = first.features.get(key), other.features.get(key)
             if ours is None or theirs is None:
-                raise UserError(f"feature {key!r} is missing in {(first if ours is None else other).root}.")
+                lacks, has = (first, other) if ours is None else (other, first)
+                remedy = ""
+                if contract.is_picture(ours or theirs or {}):
+                    remedy = " Name the cameras that all have in `loader.cameras`, or take other data."
+                raise UserError(f"feature {key!r} is missing in {lacks.root}, and not in {has.root}.{remedy}")
             if any_image_size and contract.is_picture(ours) and contract.is_picture(theirs):
                 continue
             if tuple(ours["shape"]) != tuple(theirs["shape"]) or ours.get("names") != theirs.get("names"):

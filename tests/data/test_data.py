@@ -306,6 +306,13 @@ def test_wrong_datasets_are_told(root: Path, tmp_path: Path) -> None:
     (old / "meta/info.json").write_text(json.dumps({**info, "codebase_version": "v2.1"}))
     with pytest.raises(UserError, match=r"expected v3\.0"):
         DatasetSource(old)
+    named = json.dumps(info).replace("robot0_eye_in_hand", "chest")
+    (old / "meta/info.json").write_text(named)
+    with pytest.raises(UserError, match=r"chest' is missing in .*other, and not in .*old\. Name .*`loader\.cameras`"):
+        MixtureDataset(MixtureConfig([MemberConfig(str(other)), MemberConfig(str(old))]))
+    (old / "meta/info.json").write_text(named[:50])
+    with pytest.raises(UserError, match=r"info\.json: not valid JSON"):
+        DatasetSource(old)
     shutil.rmtree(other / "meta/robocasa")
     with pytest.raises(UserError, match="Leave `tasks` out"):
         DatasetSource(other).select(MemberConfig(str(other), ["OpenDrawer"]))

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
@@ -74,16 +75,23 @@ def _parts(root: Path, row: np.dtype[Any], total: int) -> Iterator[tuple[int, di
     assert row.names is not None
     at = 0
     for path in sorted((root / "data").glob("*/*.parquet")):
-        with pq.ParquetFile(path) as file:
-            for batch in file.iter_batches(_ROWS, columns=list(row.names)):
-                part = {name: _array(batch.column(name), row[name].shape) for name in row.names}
-                count = batch.num_rows
-                if at + count > total or not np.array_equal(part["index"], np.arange(at, at + count)):
-                    raise UserError(f"{root}: frames are missing or out of order; convert the dataset again.")
-                yield at, part
-                at += count
+        for batch in _batches(path, list(row.names)):
+            part = {name: _array(batch.column(name), row[name].shape) for name in row.names}
+            count = batch.num_rows
+            if at + count > total or not np.array_equal(part["index"], np.arange(at, at + count)):
+                raise UserError(f"{root}: frames are missing or out of order; convert the dataset again.")
+            yield at, part
+            at += count
     if at != total:
         raise UserError(f"{root}: frames are missing or out of order; convert the dataset again.")
+
+
+def _batches(path: Path, names: list[str]) -> Iterator[pa.RecordBatch]:
+    try:
+        with pq.ParquetFile(path) as file:
+            yield from file.iter_batches(_ROWS, columns=names)
+    except pa.ArrowException as error:  # a file that was cut off, or one without these columns
+        raise UserError(f"{path}: cannot be read: {error} Get or convert the dataset again.") from error
 
 
 def _array(column: Any, shape: tuple[int, ...]) -> NDArray[Any]:

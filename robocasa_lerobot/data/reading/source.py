@@ -188,7 +188,10 @@ def _check_is_dataset(root: Path) -> None:
             f"no dataset at {root} (no meta/info.json).{hint} Record with `robocasa-lerobot demos` and convert with "
             "`robocasa-lerobot convert` (the demo's: `make demo` does both), or correct the mixture's `root`."
         )
-    version = json.loads(info.read_text()).get("codebase_version")
+    try:
+        version = json.loads(info.read_text(encoding="utf-8")).get("codebase_version")
+    except ValueError as error:
+        raise UserError(f"{info}: not valid JSON: {error}; get or convert the dataset again.") from error
     if version != "v3.0":
         raise UserError(
             f"{root}: LeRobotDataset {version}, expected v3.0. `robocasa-lerobot convert` reads older ones."

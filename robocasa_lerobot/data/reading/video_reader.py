@@ -40,7 +40,7 @@ class VideoReader:
         wanted = sorted({float(t) for t in times})
         try:
             found = self._decode(path, wanted)
-        except (OSError, av.error.FFmpegError) as error:
+        except (OSError, IndexError, av.error.FFmpegError) as error:  # no video stream in it is an IndexError
             self._close(path)
             raise UserError(f"{path}: cannot be decoded: {error}. Run `robocasa-lerobot verify`.") from error
         missing = [t for t in wanted if t not in found]
