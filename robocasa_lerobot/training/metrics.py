@@ -85,10 +85,22 @@ def check_trackers(names: Sequence[str]) -> None:
 
 
 def start_trackers(accelerator: Accelerator, name: str, settings: dict[str, Any]) -> None:
-    """Begin a run named `name` in every tracker that the accelerator was made with."""
-    if accelerator.log_with:
-        plain = {k: v if isinstance(v, int | float | str | bool) else json.dumps(v) for k, v in settings.items()}
+    """Begin a run named `name` in every tracker that the accelerator was made with.
+
+    Raises:
+        UserError: one cannot begin: it knows no account, or does not reach its server.
+    """
+    if not accelerator.log_with:
+        return
+    plain = {k: v if isinstance(v, int | float | str | bool) else json.dumps(v) for k, v in settings.items()}
+    try:
         accelerator.init_trackers(name, config=plain)
+    except Exception as error:  # each package has its own
+        names = ", ".join(str(getattr(tracker, "value", tracker)) for tracker in accelerator.log_with)
+        raise UserError(
+            f"the trackers cannot begin ({names}): {error} Log in first (`wandb login`; `WANDB_MODE=offline` needs no "
+            f"account), or leave `trackers` out: {METRICS} and {CURVE} are always written."
+        ) from error
 
 
 def track(accelerator: Accelerator, phase: str, line: dict[str, Any], earlier_steps: int) -> None:

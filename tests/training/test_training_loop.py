@@ -259,6 +259,14 @@ def test_training_with_everything_on(tmp_path: Path, data: Path) -> None:
     assert line["samples_per_second"] == pytest.approx(4 / line["seconds_per_step"])
 
 
+def test_tracker_that_cannot_begin_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    accelerator = Accelerator(cpu=True)
+    monkeypatch.setattr(accelerator, "log_with", ["wandb"])
+    monkeypatch.setattr(accelerator, "init_trackers", lambda *_, **__: [][0])
+    with pytest.raises(UserError, match=r"\(wandb\): list index.*`wandb login`.*leave `trackers` out"):
+        module.start_trackers(accelerator, "name", {})
+
+
 @pytest.mark.parametrize("tracker", TRACKERS)
 def test_tracker_without_its_package_is_told(
     tmp_path: Path, data: Path, monkeypatch: pytest.MonkeyPatch, tracker: str
