@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import argparse
+import shlex
 
+from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.jobs.parent import add_end_with_input, end_with_input
 
 EXAMPLE = "robocasa-lerobot train --config_path configs/experiments/demo.yaml"
@@ -23,7 +25,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
         default="auto",
         help="auto: continue what was begun, if its settings are the same; force: even if they are not",
     )
-    parser.add_argument("--stop_after", type=int, metavar="STEPS", help="save and end after so many steps of this run")
+    parser.add_argument(
+        "--stop_after", type=_steps, metavar="STEPS", help="save and end after so many steps of this run"
+    )
     parser.add_argument("--phase", metavar="NAME", help="run this phase only; what it starts from must be finished")
     parser.add_argument("--evaluate", action="store_true", help="run the phases' evaluations when they are finished")
     parser.add_argument(
@@ -36,7 +40,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "--plan", action="store_true", help="print steps, samples, missing data, disk and hours of each phase, and end"
     )
     parser.add_argument(
-        "--measure", type=int, default=20, metavar="STEPS", help="steps that --plan times; 0: none (default 20)"
+        "--measure", type=_steps, default=20, metavar="STEPS", help="steps that --plan times; 0: none (default 20)"
     )
     add_end_with_input(parser)
     parser.epilog = (
@@ -46,8 +50,31 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.set_defaults(takes_settings=True)
 
 
+def _steps(text: str) -> int:
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f"{text!r} is no number of steps: 0 or more")
+    return int(text)
+
+
 def run(args: argparse.Namespace) -> int:
     """Run the experiment; 0 when finished, 3 when it stopped as asked, 75 when a signal ended it (run it again)."""
+    from robocasa_lerobot.data.registry.registry import MissingDatasetsError
+
+    try:
+        return _run(args)
+    except MissingDatasetsError as error:
+        raise UserError(_with_file(str(error), args)) from error
+
+
+def _with_file(text: str, args: argparse.Namespace) -> str:
+    """What is said of missing datasets, with the command for the very experiment."""
+    from robocasa_lerobot.data.registry.registry import MAKE, make_remedy
+
+    scale = ["--scale", args.scale] if args.scale else []
+    return text.replace(MAKE, make_remedy(shlex.join([args.config_path, *scale, *getattr(args, "settings", ())])))
+
+
+def _run(args: argparse.Namespace) -> int:
     if args.end_with_input:
         end_with_input()
     from robocasa_lerobot.training.cpu_tuning import limit_spinning
@@ -67,7 +94,7 @@ def run(args: argparse.Namespace) -> int:
 
         plans = plan_experiment(experiment, args.phase, args.measure)
         evaluations = plan_evaluations(experiment, [plan.phase for plan in plans if not plan.left_out])
-        print(render_plan(experiment, plans, best_device(experiment.device), evaluations))
+        print(_with_file(render_plan(experiment, plans, best_device(experiment.device), evaluations), args))
         return 0
     print(to_yaml(experiment), flush=True)
     if args.print_config:

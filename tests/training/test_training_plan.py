@@ -12,9 +12,10 @@ import yaml
 from accelerate import Accelerator
 from policy_support import with_features
 from safetensors.torch import load_file
-from training_support import TINY, experiment_file, tiny
+from training_support import ROOT, TINY, experiment_file, tiny
 
 from robocasa_lerobot import contract
+from robocasa_lerobot.cli import main
 from robocasa_lerobot.data.fake import write_fake_dataset
 from robocasa_lerobot.training.config.experiment import load_experiment
 from robocasa_lerobot.training.phases import run_experiment
@@ -23,6 +24,19 @@ from robocasa_lerobot.training.planning.plan_text import render_plan
 from robocasa_lerobot.training.setup import builders
 from robocasa_lerobot.training.setup.build_phase import prepare_phase
 from robocasa_lerobot.training.weights.checkpoint import save_checkpoint
+
+
+def test_missing_data_are_told_with_the_command_that_makes_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)  # where nothing has been made
+    asked = ["train", "--config_path", str(ROOT / "configs/experiments/small/lifelong_cpu.yaml"), "--seed=3"]
+    make = f"robocasa-lerobot data {asked[2]} --seed=3 --make` records and converts it"
+    assert main([*asked, "--plan", "--measure", "0"]) == 0
+    assert make in capsys.readouterr().out
+    assert main(asked) == 2
+    assert make in capsys.readouterr().err
+
 
 MISSING = "{select: [{task_set: atomic_seen, split: target}]}"
 

@@ -21,8 +21,15 @@ from robocasa_lerobot.data.registry.registry_file import (
 from robocasa_lerobot.errors import UnknownNameError, UserError
 from robocasa_lerobot.jsonl import read_jsonl
 
-MAKE = "`robocasa-lerobot data EXPERIMENT_FILE --make` records and converts it with our demonstrators"
 _SHOWN = 20  # missing datasets that an error lists
+
+
+def make_remedy(experiment: str = "EXPERIMENT_FILE") -> str:
+    """How to make a dataset that our demonstrators make, for an `experiment` file, with its settings."""
+    return f"`robocasa-lerobot data {experiment} --make` records and converts it with our demonstrators"
+
+
+MAKE = make_remedy()  # where the file is not known
 
 
 class NothingRegisteredError(UserError):
