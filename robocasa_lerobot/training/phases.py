@@ -25,8 +25,7 @@ from robocasa_lerobot.training.setup import builders, features
 from robocasa_lerobot.training.setup import phase_data as joining
 from robocasa_lerobot.training.setup.build_phase import (
     check_begun,
-    check_scope,
-    check_sizes,
+    check_policy,
     planned_policy,
     prepare_phase,
     start_of,
@@ -158,13 +157,13 @@ def check_phase(
     if not begun:
         if parent is None:
             builders.check_processors(config, meta)
+        start = None
         if experiment.init_of(phase) != FROM_SCRATCH:
             before = planned_policy(experiment, parent) if parent is not None else ({}, checkpoint)
             start = builders.policy_config(*before, device)
             if phase.statistics == "keep":
                 check_kept_settings(config, start, phase.name)
-            check_sizes(config, start, meta, phase)
-        check_scope(config, meta, phase)
+        check_policy(config, start, meta, phase)
     phase_evaluations(phase)
     if alone and not begun:
         start_of(experiment, phase)

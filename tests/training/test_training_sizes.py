@@ -32,6 +32,17 @@ def test_sizes_that_do_not_fit_the_phase_before(tmp_path: Path, data: Path) -> N
     assert not (tmp_path / "out").exists()
 
 
+def test_another_type_than_that_of_the_phase_before_is_named(tmp_path: Path, data: Path) -> None:
+    with pytest.raises(UserError, match=r"'finetune' starts from phase 'pretrain', .* asks for 'act'.*from_scratch"):
+        run(tmp_path, data, "--phases.finetune.policy.type=act")
+
+
+def test_names_of_inputs_are_names(tmp_path: Path, data: Path) -> None:
+    for setting, expected in (("rename={a: null}", "expected names"), ("leave_out=wrist", "expected a list of names")):
+        with pytest.raises(UserError, match=expected):
+            run(tmp_path, data, f"--phases.finetune.policy.{setting}")
+
+
 def test_settings_that_change_no_size_pass_and_those_of_a_checkpoint_are_looked_at(tmp_path: Path, data: Path) -> None:
     assert run(tmp_path / "first", data, "--phases.finetune.policy.dropout=0.2")
     start = f"--phases.pretrain.init={tmp_path}/first/out/pretrain/checkpoints/last/pretrained_model"

@@ -68,6 +68,17 @@ class ActionChunkConfig(PreTrainedConfig):
 
     push_to_hub: bool = False
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.image_size is not None and min(self.image_size) < 1:
+            raise UserError(
+                f"image_size is {list(self.image_size)}, expected a height and a width of at least 1 pixel."
+            )
+        if self.state_clip is not None and not self.state_clip > 0:
+            raise UserError(f"state_clip is {self.state_clip}, expected more than 0, or null for no bound.")
+        if self.scheduler_warmup_steps < 0:
+            raise UserError(f"scheduler_warmup_steps is {self.scheduler_warmup_steps}, expected 0 or more.")
+
     @property
     def reward_delta_indices(self) -> None:
         """No rewards are used."""

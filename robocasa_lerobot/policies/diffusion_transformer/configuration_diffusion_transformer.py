@@ -23,6 +23,7 @@ TEXT_ENCODERS = ("token", "clip")
 NOISE_SCHEDULERS = ("DDPM", "DDIM")
 TIMESTEP_SPACINGS = ("trailing", "leading", "linspace")
 PREDICTION_TYPES = ("epsilon", "sample")
+BETA_SCHEDULES = ("linear", "scaled_linear", "squaredcos_cap_v2")
 
 
 @PreTrainedConfig.register_subclass("diffusion_transformer")
@@ -138,6 +139,7 @@ class DiffusionTransformerConfig(ActionChunkConfig):
             ("noise_scheduler", self.noise_scheduler, NOISE_SCHEDULERS),
             ("timestep_spacing", self.timestep_spacing, TIMESTEP_SPACINGS),
             ("prediction_type", self.prediction_type, PREDICTION_TYPES),
+            ("beta_schedule", self.beta_schedule, BETA_SCHEDULES),
         ):
             if name not in known:
                 raise UnknownNameError(kind, name, known)
@@ -145,6 +147,15 @@ class DiffusionTransformerConfig(ActionChunkConfig):
     def _check_sizes(self) -> None:
         self.check_at_least_one(("n_obs_steps", "horizon", "n_action_steps", "noise_draws"))
         self.check_at_least_one(("width", "n_heads", "n_decoder_layers", "vision_keypoints", "vision_stem"))
+        self.check_at_least_one(("vision_features", "num_train_timesteps"))
+        assert self.drop_n_last_frames is not None
+        if self.drop_n_last_frames < 0:
+            raise UserError(f"drop_n_last_frames is {self.drop_n_last_frames}, expected 0 or more.")
+        for name in ("dropout", "dropout_embedding"):
+            if not 0.0 <= getattr(self, name) < 1.0:
+                raise UserError(f"{name} is {getattr(self, name)}, expected at least 0 and below 1.")
+        if not self.clip_sample_range > 0:
+            raise UserError(f"clip_sample_range is {self.clip_sample_range}, expected more than 0.")
         if self.vision_grid is not None:
             self.check_at_least_one(("vision_grid",))
         longest = self.horizon - self.n_obs_steps + 1

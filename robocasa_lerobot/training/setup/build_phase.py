@@ -138,7 +138,8 @@ def prepare_phase(
     share = phase.batch_size // phase.gradient_accumulation
     dropped = phase.drop_last_frames
     if dropped is None:
-        dropped = getattr(config, "drop_n_last_frames", None) or 0
+        # LeRobot's policies compute it from lengths with which it may come to less than none.
+        dropped = max(0, getattr(config, "drop_n_last_frames", None) or 0)
     sampler = dataset.sampler(seed, drop_last_frames=dropped)
     held_out = None
     if apart is not None and phase.held_out is not None:
@@ -181,39 +182,26 @@ def check_begun(
     records.check_same_data(folder, data, force)
 
 
-def check_scope(config: PreTrainedConfig, meta: MixtureMeta, phase: PhaseConfig) -> None:
-    """Whether what a phase freezes, or changes by low ranks, is there in its policy, built without its weights.
+def check_policy(
+    config: PreTrainedConfig, before: PreTrainedConfig | None, meta: MixtureMeta, phase: PhaseConfig
+) -> None:
+    """Check a phase's policy, built without weights: their sizes, and what it freezes or changes by low ranks.
 
-    A policy that cannot be built so is not looked at: its phase will say.
+    A policy that cannot be built so is not looked at: its phase will say. `before` is that which the phase starts from.
 
     Raises:
-        UserError: a pattern fits nothing, or nothing is left to train.
+        UserError: the phase changes settings that its weights go by, a pattern fits nothing, or nothing is trained.
     """
-    if not phase.freeze and phase.lora is None:
+    changed = [key for key in phase.policy if key not in (RENAME, LEAVE_OUT, "type")] if before is not None else []
+    scope = bool(phase.freeze) or phase.lora is not None
+    if not changed and not scope:
         return
     try:
         policy = builders.policy_without_weights(config, meta)
+        theirs = _sizes(builders.policy_without_weights(before, meta)) if before is not None and changed else {}
     except Exception:  # as where packages are missing
         return
-    apply_training_scope(policy, phase, seed=0)
-    trained_parameters(policy, phase)
-
-
-def check_sizes(config: PreTrainedConfig, before: PreTrainedConfig, meta: MixtureMeta, phase: PhaseConfig) -> None:
-    """Whether the weights that a phase starts from have the sizes of its own, both policies built without them.
-
-    Those that cannot be built so are not looked at: the phase will say.
-
-    Raises:
-        UserError: the phase changes settings of the policy that its weights go by.
-    """
-    changed = [key for key in phase.policy if key not in (RENAME, LEAVE_OUT, "type")]
-    if not changed:
-        return
-    try:
-        ours, theirs = (_sizes(of, meta) for of in (config, before))
-    except Exception:  # as where packages are missing
-        return
+    ours = _sizes(policy) if changed else {}
     differ = [name for name in ours.keys() | theirs.keys() if ours.get(name) != theirs.get(name)]
     if differ:
         name, settings = min(differ), ", ".join(f"policy.{key}" for key in changed)
@@ -223,10 +211,12 @@ def check_sizes(config: PreTrainedConfig, before: PreTrainedConfig, meta: Mixtur
             f"{_size(ours.get(name))} here. Leave settings that change sizes to the policy it starts from, or set "
             f"`init: {FROM_SCRATCH}`."
         )
+    if scope:
+        apply_training_scope(policy, phase, seed=0)
+        trained_parameters(policy, phase)
 
 
-def _sizes(config: PreTrainedConfig, meta: MixtureMeta) -> dict[str, tuple[int, ...]]:
-    policy = builders.policy_without_weights(config, meta)
+def _sizes(policy: torch.nn.Module) -> dict[str, tuple[int, ...]]:
     return {name: tuple(weight.shape) for name, weight in policy.named_parameters()}
 
 
@@ -306,6 +296,12 @@ def planned_policy(
         init = experiment.init_of(phase)
         return policy_settings(experiment, phase), None if init == FROM_SCRATCH else _config_folder(init, offline)
     settings, checkpoint = planned_policy(experiment, parent, offline)
+    kind, asked = settings.get("type", experiment.policy.get("type")), phase.policy.get("type")
+    if None not in (kind, asked) and kind != asked:
+        raise UserError(
+            f"phase {phase.name!r} starts from phase {parent.name!r}, which trains a policy of type {kind!r}, and asks "
+            f"for {asked!r}. Leave `policy.type` out, or set `init: {FROM_SCRATCH}`."
+        )
     return builders.laid_over(settings, policy_settings(experiment, phase)), checkpoint
 
 

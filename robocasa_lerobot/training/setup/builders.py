@@ -16,6 +16,7 @@ import lerobot.policies  # noqa: F401  registers LeRobot's own policy types
 import torch
 from huggingface_hub import hf_hub_download, snapshot_download, try_to_load_from_cache
 from lerobot.configs.policies import PreTrainedConfig
+from lerobot.configs.types import FeatureType, NormalizationMode
 from lerobot.datasets.factory import resolve_delta_timestamps
 from lerobot.policies.factory import get_policy_class, make_policy, make_pre_post_processors
 from lerobot.policies.pretrained import PreTrainedPolicy
@@ -93,7 +94,7 @@ def policy_config(settings: Mapping[str, Any], checkpoint: Path | None, device: 
         if key not in names:
             raise UnknownNameError("key", key, names, f"(in the settings of the policy {kind!r})")
     if MAPPING in fields:  # LeRobot takes what a mapping does not name for left as it is
-        fields[MAPPING] = {**(base.get(MAPPING) or _own_mapping(str(kind))), **(fields[MAPPING] or {})}
+        fields[MAPPING] = {**(base.get(MAPPING) or _own_mapping(str(kind))), **_mapping(fields[MAPPING])}
     data = {"push_to_hub": False, **base, **fields, "device": device, "pretrained_path": None, "type": kind}
     try:
         config: PreTrainedConfig = draccus.decode(PreTrainedConfig, data)
@@ -101,6 +102,25 @@ def policy_config(settings: Mapping[str, Any], checkpoint: Path | None, device: 
         cause = error.__cause__ if isinstance(error.__cause__, UserError) else error
         raise UserError(f"settings of the policy {kind!r}: {cause}") from error
     return config
+
+
+def _mapping(given: Any) -> dict[str, Any]:
+    """How kinds of features are asked to be normalised, with kinds and ways that LeRobot has.
+
+    Raises:
+        UserError: other ones.
+    """
+    kinds, ways = [kind.value for kind in FeatureType], [way.value for way in NormalizationMode]
+    if not isinstance(given or {}, Mapping):
+        raise UserError(f"{MAPPING} is {given!r}, expected a mapping, such as {{ACTION: {ways[0]}}}.")
+    for kind, way in (given or {}).items():
+        if kind not in kinds:
+            raise UnknownNameError("kind of feature", str(kind), kinds, f"(in `{MAPPING}`)")
+        if way not in ways:
+            raise UnknownNameError(
+                "way to normalise", str(getattr(way, "value", way)), ways, f"({kind} in `{MAPPING}`)"
+            )
+    return dict(given or {})
 
 
 def laid_over(own: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:

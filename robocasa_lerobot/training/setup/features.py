@@ -39,6 +39,11 @@ def renamed_inputs(
     Raises:
         UserError: an input that the checkpoint does not have, or two of the data for one of it.
     """
+    for field, value, kind in ((RENAME, rename, Mapping), (LEAVE_OUT, leave_out, list | tuple)):
+        names = [*value, *value.values()] if isinstance(value, Mapping) else value
+        if not isinstance(value, kind) or not all(isinstance(name, str) for name in names):
+            what = "names in the data with names in the checkpoint" if field == RENAME else "a list of names"
+            raise UserError(f"`{field}` of the policy's settings is {value!r}, expected {what}.")
     if len(set(rename.values())) < len(rename):
         raise UserError(f"`{RENAME}` of the policy gives two features to one of the checkpoint's: {dict(rename)}.")
     new = new_names(inputs, rename)
@@ -88,9 +93,12 @@ def check_features(config: PreTrainedConfig, meta: MixtureMeta, whose: str = "th
                 f"it is, `{RENAME}: {{<name in the data>: {key}}}`, or `{LEAVE_OUT}: [{key}]`)",
             )
         if not _fits(config, found[key], wanted):
+            remedy = "Take data of the same robot and actions, or start `from_scratch`."
+            if wanted.type is FeatureType.VISUAL:
+                remedy = "Set `loader.image_size` to the policy's size."
             raise UserError(
-                f"feature {key!r}: {whose} has shape {tuple(wanted.shape)}, the data "
-                f"{tuple(found[key].shape)}. For pictures, set `loader.image_size` to the policy's size."
+                f"feature {key!r}: {whose} has shape {tuple(wanted.shape)}, the data {tuple(found[key].shape)}. "
+                f"{remedy}"
             )
 
 
