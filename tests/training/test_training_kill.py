@@ -16,10 +16,12 @@ import numpy as np
 import pytest
 import torch
 import yaml
+from safetensors import SafetensorError
 from safetensors.torch import load_file, save_file
 from training_support import ROOT, experiment_file
 
 from robocasa_lerobot.data.fake import write_fake_dataset
+from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.training.config.experiment import EmaConfig
 from robocasa_lerobot.training.weights.checkpoint import (
     TrainingState,
@@ -306,3 +308,18 @@ def test_a_kill_at_any_change_of_files_leaves_whole_checkpoints(tmp_path: Path) 
     assert set(newest) == {6, 9}
     assert files_of(phase / "checkpoints") == [f"000009/{file}" for file in complete]
     print(f"{len(newest) - 1} kills")
+
+
+@pytest.mark.parametrize("full", [OSError(28, "No space left on device"), SafetensorError("No space left on device")])
+def test_a_full_disk_is_told_and_takes_nothing_of_what_is_saved(tmp_path: Path, full: Exception) -> None:
+    class Disk(Written):
+        def save_pretrained(self, folder: Path) -> None:
+            raise full
+
+    again = {"example": "begins the phase anew", "later": "goes on from step 3"}
+    save_checkpoint(tmp_path / "later", state_at(3), Written("train_config.json"))
+    for phase, goes_on in again.items():
+        with pytest.raises(UserError, match=rf"step 6 cannot be written .*No space left.*`keep_last`.*{goes_on}"):
+            save_checkpoint(tmp_path / phase, state_at(6), Disk("train_config.json"))
+    assert not list((tmp_path / "example/checkpoints").iterdir())
+    assert sorted(path.name for path in (tmp_path / "later/checkpoints").iterdir()) == ["000003", "last"]

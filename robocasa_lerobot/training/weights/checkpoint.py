@@ -21,6 +21,7 @@ import torch
 from lerobot.common.train_utils import load_training_state, save_training_state
 from lerobot.optim import load_optimizer_state_dict, load_scheduler_state
 from lerobot.policies.pretrained import PreTrainedPolicy
+from safetensors import SafetensorError
 from safetensors.torch import load_file, load_model, save_file, save_model
 from torch.optim.lr_scheduler import LambdaLR, LRScheduler
 
@@ -122,11 +123,33 @@ def pretrained_model(checkpoint: Path) -> Path:
 
 
 def save_checkpoint(phase_dir: Path, state: TrainingState, train_config: Any) -> Path:
-    """Write a checkpoint aside, rename it, and point `last` at it."""
+    """Write a checkpoint aside, rename it, and point `last` at it.
+
+    Raises:
+        UserError: it cannot be written, as where the disk is full; those before it stay.
+    """
     parent = phase_dir / CHECKPOINTS
     parent.mkdir(parents=True, exist_ok=True)
     tidy(phase_dir)
     final, aside = parent / f"{state.step:06d}", parent / f".writing-{state.step:06d}"
+    try:
+        _write(aside, phase_dir, state, train_config)
+    except (OSError, SafetensorError) as error:
+        shutil.rmtree(aside, ignore_errors=True)  # what others on a full disk may need
+        before = last_checkpoint(phase_dir)
+        goes_on = f"goes on from step {checkpoint_step(before)}" if before is not None else "begins the phase anew"
+        raise UserError(
+            f"the checkpoint of step {state.step} cannot be written to {parent}: {error}. Free some disk, or keep "
+            f"fewer checkpoints (`keep_last`, `keep_every`); then the same command {goes_on}."
+        ) from error
+    if final.exists():
+        _drop(final)
+    aside.rename(final)
+    _point_last_at(final)
+    return final
+
+
+def _write(aside: Path, phase_dir: Path, state: TrainingState, train_config: Any) -> None:
     model_dir, state_dir = aside / PRETRAINED, aside / STATE
     save_training_state(aside, state.step, state.optimizer, state.scheduler)
     (state_dir / LOG_WINDOW).write_text(json.dumps(state.log_window))
@@ -146,11 +169,6 @@ def save_checkpoint(phase_dir: Path, state: TrainingState, train_config: Any) ->
     experiment = experiment_of(getattr(train_config, "job_name", None), phase_dir.name)
     Origin(experiment, phase_dir.name, state.step).write(model_dir)
     write_model_card(model_dir, str(state.policy.name), experiment, phase_dir, state.step)
-    if final.exists():
-        _drop(final)
-    aside.rename(final)
-    _point_last_at(final)
-    return final
 
 
 def restore(checkpoint: Path, state: TrainingState) -> None:
