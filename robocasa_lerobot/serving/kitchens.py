@@ -46,7 +46,7 @@ class Kitchens:
         terminate_on_success: a trial ends when its goal holds, as in our evaluation; else at its horizon.
 
     Raises:
-        UserError: an unknown task, or numbers out of their range.
+        UserError: an unknown task, split or render preset, or numbers out of their range.
     """
 
     def __init__(
@@ -61,8 +61,9 @@ class Kitchens:
     ) -> None:
         if isinstance(tasks, str):
             raise UserError(f"tasks: found the text {tasks!r}, expected a list of names.")
-        if seed < 0:
-            raise UserError(f"seed: found {seed}, expected at least 0.")
+        for name, number, least in (("seed", seed, 0), ("camera_size", camera_size, 1), ("max_steps", max_steps, 1)):
+            if number is not None and number < least:
+                raise UserError(f"{name}: found {number}, expected at least {least}.")
         self._suites = _suites(tasks)
         self.seed = seed
         self._arguments: dict[str, Any] = {
@@ -72,6 +73,8 @@ class Kitchens:
             "render_preset": render_preset,
             "terminate_on_success": terminate_on_success,
         }
+        # Fails here, once, where the runner says why: in a reset it would count as each trial's failure.
+        KitchenEnv(next(iter(self._suites)), **self._arguments).close()
         self._env: KitchenEnv | None = None
         self._success = False
 

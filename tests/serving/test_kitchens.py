@@ -46,6 +46,10 @@ def test_seeds_are_those_of_an_evaluation() -> None:
         ({"tasks": ["OpenDrwer"]}, "OpenDrawer"),
         ({"tasks": []}, "found none"),
         ({"seed": -1}, "at least 0"),
+        ({"split": "targt"}, "Did you mean 'target'"),
+        ({"render_preset": "nice"}, "fast, quality"),
+        ({"camera_size": 0}, "camera_size: found 0"),
+        ({"max_steps": 0}, "max_steps: found 0"),
     ],
 )
 def test_mistakes_are_told(settings: dict[str, object], text: str) -> None:
