@@ -100,6 +100,25 @@ def test_the_same_env_here_and_in_another_process_gives_the_same_trials(tmp_path
     assert len({record.trajectory for record in here}) == 8
 
 
+def test_a_wrapper_hides_nothing_that_an_env_says(tmp_path: Path) -> None:
+    own = {"policy": "zero,demonstrator", "env.tasks": "Push", "trials": 2}
+    found = {}
+    for name in ("ExpertSlide", "wrapped"):
+        factory = f"{SUPPORT / 'evaluation_env.py'}:{name}"
+        found[name] = comparable(evaluate(tmp_path / name, **own, **{"env.factory": factory}))
+        asked = foreign_worker.Host()
+        asked.make(factory, "Push", {})
+        pictures = [
+            asked.reset(seed=0, pictures=shown)[1].get("pixels/robot0_agentview_left") for shown in (True, False)
+        ]
+        assert pictures[0] is not None
+        assert pictures[1] is None
+    assert found["ExpertSlide"] == found["wrapped"]
+    assert {trial["instruction"] for trial in found["wrapped"]} == {"push the block"}
+    assert {trial["steps"] for trial in found["wrapped"] if trial["label"] == "zero"} == {30}
+    assert all(trial["success"] for trial in found["wrapped"] if trial["label"] == "demonstrator")
+
+
 def test_check_says_where_trials_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["eval", "--check", *arguments(tmp_path)]) == 0
     assert "2 tasks, 18 trials in another simulator" in capsys.readouterr().out

@@ -124,6 +124,15 @@ def flatten(value: Any, name: str = "") -> dict[str, Any]:
     return {name: np.asarray(value)}
 
 
+def attribute(env: Any, name: str) -> Any:
+    """An attribute of an env or, as Gymnasium's wrappers hide them, of one that it wraps; None where none has it."""
+    with contextlib.suppress(AttributeError):
+        return getattr(env, name)
+    with contextlib.suppress(AttributeError):
+        return env.get_wrapper_attr(name)
+    return None
+
+
 def load(factory: str) -> tuple[Callable[..., Any], ModuleType]:
     """The callable named `module:name` or `FILE.py:name`, and its module."""
     place, colon, name = factory.rpartition(":")
@@ -166,12 +175,12 @@ class Host:
         self._env = env = made(task=task, **arguments)
         space = env.action_space
         low, high = (np.broadcast_to(np.asarray(b, np.float64), space.shape) for b in (space.low, space.high))
-        horizon = getattr(env, "horizon", None) or getattr(env, "_max_episode_steps", None)
-        fps = getattr(env, "fps", None) or (getattr(env, "metadata", None) or {}).get("render_fps")
+        horizon = attribute(env, "horizon") or attribute(env, "_max_episode_steps")
+        fps = attribute(env, "fps") or (attribute(env, "metadata") or {}).get("render_fps")
         return {
             "horizon": None if horizon is None else int(horizon),
             "fps": None if fps is None else float(fps),
-            "expert": callable(getattr(env, "expert_action", None)),
+            "expert": callable(attribute(env, "expert_action")),
         }, {"low": low, "high": high}
 
     def reset(self, seed: int, pictures: bool) -> Message:
@@ -190,7 +199,7 @@ class Host:
 
     def expert(self) -> Message:
         """The action of the env's own expert."""
-        return {}, {"action": np.asarray(self._env.expert_action(), np.float32)}
+        return {}, {"action": np.asarray(attribute(self._env, "expert_action")(), np.float32)}
 
     def close(self) -> Message:
         """End the env; the process ends with it."""
@@ -201,8 +210,9 @@ class Host:
 
     def _observing(self, pictures: bool) -> Any:
         # Of use where an env looks at it, as our own does; harmless elsewhere.
-        if hasattr(self._env, "render_observations"):
-            self._env.render_observations = pictures
+        for one in (self._env, getattr(self._env, "unwrapped", self._env)):
+            if hasattr(one, "render_observations"):
+                one.render_observations = pictures
         return self._env
 
     def _told(self, observation: Any, info: dict[str, Any], pictures: bool) -> Message:
@@ -210,7 +220,7 @@ class Host:
         if not pictures:
             arrays = {name: value for name, value in arrays.items() if name.split("/")[0] != "pixels"}
         terms = info.get("success_terms") or {}
-        text = info.get("instruction") or getattr(self._env, "task_description", None)
+        text = info.get("instruction") or attribute(self._env, "task_description")
         message = {
             "is_success": bool(np.asarray(info.get("is_success", False)).any()),
             "terms": {str(name): bool(met) for name, met in terms.items()},
