@@ -8,7 +8,9 @@ import dataclasses
 import io
 import os
 import pickle
+import re
 import signal
+import struct
 import subprocess
 import sys
 import time
@@ -292,6 +294,24 @@ def test_frames_are_read_as_they_were_written_and_mutations_never_hang() -> None
     assert 0 < read < 500
     with pytest.raises(foreign_worker.FrameError, match="expected booleans or numbers"):
         foreign_worker.write_frame(io.BytesIO(), {}, {"objects": np.array([object()])})
+
+
+def test_a_client_written_after_the_documentation_is_answered() -> None:
+    text = (ROOT / "docs" / "simulators.md").read_text(encoding="utf-8")
+    (example,) = re.findall(r"^\{\"ask\": .*\}$", text, flags=re.MULTILINE)
+    action = np.zeros(2, "<f4").tobytes()
+    frame = b"RKL1" + struct.pack(">IQ", len(example), len(action)) + example.encode() + action
+    questions = io.BytesIO()
+    foreign_worker.write_frame(questions, {"ask": "make", "factory": PLAIN, "task": "Slide", "arguments": {}})
+    foreign_worker.write_frame(questions, {"ask": "reset", "seed": 0, "pictures": True})
+    questions.write(frame)
+    questions.seek(0)
+    answers = io.BytesIO()
+    foreign_worker.serve(questions, answers)
+    answers.seek(0)
+    said = [foreign_worker.read_frame(answers)[0] for _ in range(3)]
+    assert [one["answers"] for one in said] == ["make", "reset", "step"]
+    assert said[2]["reward"] == 0.0
 
 
 def test_the_worker_answers_unknown_questions_and_goes_on() -> None:
