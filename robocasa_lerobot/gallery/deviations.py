@@ -32,6 +32,8 @@ and why, stands here. A task that is a little easier or harder than the original
 this page.
 
 ## In many tasks
+- Instructions: they ask for the same in words of our own. A policy that was trained on the published data is told
+  sentences here that it has not seen, and one that was trained here likewise there.
 - Objects: the {extended} categories of which RoboCasa365 has generated models only are drawn like the others, {of} in
   all; its default registries leave them out.
 - Nor does a scene have two objects of one category by chance, which an instruction could not tell apart, but in tasks

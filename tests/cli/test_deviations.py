@@ -61,6 +61,12 @@ def test_the_command_writes_the_page(tmp_path: Path) -> None:
     assert "| [OpenOven](tasks.md#openoven) | " in text
 
 
+def test_what_differs_in_many_tasks_is_current_and_tells_of_the_instructions() -> None:
+    beginning = deviations([])
+    assert "\n- Instructions: " in beginning
+    assert DOCS.read_text(encoding="utf-8").startswith(beginning), "run `make docs`"
+
+
 @pytest.mark.slow
 def test_the_page_is_current() -> None:
     assert DOCS.read_text(encoding="utf-8") == deviations(map(get_task, task_names())), "run `make docs`"
