@@ -65,6 +65,24 @@ def test_what_is_no_message_is_refused_with_a_reason(text: str, why: str) -> Non
         parse(text)
 
 
+@pytest.mark.parametrize(
+    ("kind", "field", "words", "low", "high"),
+    [
+        ("set", "speed", "`speed`: from 0.01 to 1", 0.01, 1),
+        ("view", "azimuth", "azimuth from -100 to 100", -100, 100),
+        ("view", "elevation", "elevation from -1.57 to 1.57", -1.57, 1.57),
+        ("view", "distance", "distance from 0.2 to 10 metres", 0.2, 10),
+    ],
+)
+def test_ranges_are_those_that_the_page_tells(kind: str, field: str, words: str, low: float, high: float) -> None:
+    assert words in PROTOCOL.read_text(encoding="utf-8")
+    for number in (low, high):
+        assert parse(json.dumps({"type": kind, field: number}))[field] == number
+    for number in (low - 0.001, high + 0.001):
+        with pytest.raises(ProtocolError, match="expected a number from"):
+            parse(json.dumps({"type": kind, field: number}))
+
+
 def test_a_reason_is_one_plain_line() -> None:
     said = "cup\u00a0tipped\nover \U0001f469\u200d\U0001f373"
     assert parse(json.dumps({"type": "discard", "reason": said}))["reason"] == "cup tipped over \U0001f469 \U0001f373"
