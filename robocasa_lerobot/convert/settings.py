@@ -19,6 +19,7 @@ from robocasa_lerobot.convert.mapping.robots import choose_mapping
 from robocasa_lerobot.convert.reading.decisions import decisions_of
 from robocasa_lerobot.convert.reading.demo import Demo, RejectedEpisodeError, SourceError
 from robocasa_lerobot.convert.reading.demo_file import DemoFile
+from robocasa_lerobot.convert.reading.inputs import check_image_size
 from robocasa_lerobot.convert.reading.layout import ACTION_KEYS, Layout
 from robocasa_lerobot.convert.reading.mjcf import AssetFinder, loadable, scene_names
 from robocasa_lerobot.convert.reading.safe_scan import survey
@@ -78,10 +79,7 @@ class ConversionSettings:
         object.__setattr__(self, "extra_columns", tuple(self.extra_columns))  # a list where it comes from JSON
         if self.max_gop < 1:
             raise UserError(f"the largest key frame interval is {self.max_gop} frames; at least 1 is needed.")
-        if self.image_size is not None and (self.image_size < 16 or self.image_size % 2):
-            raise UserError(
-                f"the image size {self.image_size} is not possible: an even number >= 16 is needed (video)."
-            )
+        check_image_size(self.image_size)
         if self.cameras is not None and (not self.cameras or len(set(self.cameras)) != len(self.cameras)):
             raise UserError(f"cameras {', '.join(self.cameras) or '(none)'}: name each camera once, and at least one.")
         if self.instruction is not None and not self.instruction.strip():

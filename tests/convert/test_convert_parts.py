@@ -143,7 +143,9 @@ def test_no_mapping_is_an_error_that_names_the_known_ones(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize(
-    "fields", [{"image_size": 15}, {"image_size": 33}, {"cameras": ()}, {"instruction": " "}], ids=str
+    "fields",
+    [{"image_size": 15}, {"image_size": 33}, {"image_size": 100_000}, {"cameras": ()}, {"instruction": " "}],
+    ids=str,
 )
 def test_impossible_settings_are_refused(fields: dict[str, Any]) -> None:
     with pytest.raises(UserError):

@@ -167,6 +167,8 @@ def test_what_cannot_be_rendered_is_said_before_anything_is_written(converted: P
         render_dataset(converted, converted / "again", _settings(), workers=1)
     with pytest.raises(UserError, match="even number"):
         RenderSettings(image_size=33)
+    with pytest.raises(UserError, match="image size 100000"):
+        RenderSettings(image_size=100_000)
 
 
 @pytest.mark.render

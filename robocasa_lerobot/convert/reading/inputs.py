@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from robocasa_lerobot.convert.reading.hdf5 import SourceError
+from robocasa_lerobot.convert.reading.hdf5 import MAX_IMAGE_SIDE, SourceError
 from robocasa_lerobot.convert.record_files import CONVERSION_FILE, META_FOLDER
 from robocasa_lerobot.errors import UserError, suggest
 from robocasa_lerobot.hdf5_files import hdf5_files_of
 
 INFO_FILE = "meta/info.json"  # of LeRobot datasets of all versions
+_MIN_IMAGE_SIDE = 16
 
 
 def is_dataset(path: Path) -> bool:
@@ -65,3 +66,16 @@ def check_converted(root: Path) -> None:
     if not (root / META_FOLDER / CONVERSION_FILE).is_file():
         what = "a dataset without our records" if is_dataset(root) else "no dataset"
         raise UserError(f"{root} is {what}: {META_FOLDER}/{CONVERSION_FILE}, which `convert` writes, is not there.")
+
+
+def check_image_size(size: int | None) -> None:
+    """Check that pictures of `size` pixels in height and width can be made and encoded; None is no wish.
+
+    Raises:
+        UserError: it is odd, too small or too large.
+    """
+    if size is not None and (size % 2 or not _MIN_IMAGE_SIDE <= size <= MAX_IMAGE_SIDE):
+        raise UserError(
+            f"the image size {size} is not possible: an even number from {_MIN_IMAGE_SIDE} to {MAX_IMAGE_SIDE} is "
+            "needed (video)."
+        )

@@ -21,6 +21,7 @@ from robocasa_lerobot import contract
 from robocasa_lerobot.convert.lerobot_v3 import ExportedDataset, ExportedEpisode
 from robocasa_lerobot.convert.reading.demo_file import RejectedEpisodeError
 from robocasa_lerobot.convert.reading.extras import read_scene, read_states
+from robocasa_lerobot.convert.reading.inputs import check_image_size
 from robocasa_lerobot.convert.reading.mjcf import AssetFinder, loadable, scene_names
 from robocasa_lerobot.convert.record_files import EXTRAS, kept_assets
 from robocasa_lerobot.convert.rerender.camera_configs import check_camera_configs, with_cameras
@@ -51,10 +52,7 @@ class RenderSettings:
     asset_roots: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        if self.image_size is not None and (self.image_size < 16 or self.image_size % 2):
-            raise UserError(
-                f"the image size {self.image_size} is not possible: an even number >= 16 is needed (video)."
-            )
+        check_image_size(self.image_size)
         if self.cameras is not None and (not self.cameras or len(set(self.cameras)) != len(self.cameras)):
             raise UserError(f"cameras {', '.join(self.cameras) or '(none)'}: name each camera once, and at least one.")
         if self.video_codec not in CODECS:
