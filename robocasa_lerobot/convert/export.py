@@ -57,6 +57,8 @@ class ExportSettings:
             raise UserError(
                 "--cameras names no camera: name some (A,B), leave it out for all, or give --no-images for none."
             )
+        if self.cameras is not None and len(set(self.cameras)) != len(self.cameras):
+            raise UserError(f"--cameras {', '.join(self.cameras)}: name each camera once.")
 
 
 @dataclass(frozen=True)
@@ -80,7 +82,9 @@ def export(root: Path, out: Path, settings: ExportSettings | None = None, overwr
             fails. Nothing is at `out` then.
     """
     settings = settings or ExportSettings()
-    if out.exists() and (not overwrite or out.is_dir()):
+    if out.is_dir():
+        raise UserError(f"--out {out} is a folder: name an HDF5 file, such as {out / f'{root.absolute().name}.hdf5'}.")
+    if out.exists() and not overwrite:
         raise UserError(f"{out} exists already. Choose another --out, or replace it with --overwrite.")
     dataset = ExportedDataset(root)
     episodes = _chosen(dataset, settings.task)

@@ -254,6 +254,10 @@ def test_an_existing_file_is_replaced_only_if_asked_for(ours: tuple[Path, Path, 
     assert sum(name.endswith("_image") for name in items(out)) == 3
     with pytest.raises(UserError, match="unknown camera 'eye'"):
         export(ours[1], tmp_path / "b.hdf5", ExportSettings(cameras=("eye",)))
+    with pytest.raises(UserError, match="name each camera once"):
+        ExportSettings(cameras=contract.CAMERAS[:1] * 2)
+    with pytest.raises(UserError, match="is a folder: name an HDF5 file"):
+        export(ours[1], tmp_path, overwrite=True)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["out.hdf5"]
 
 
