@@ -119,6 +119,8 @@ def test_absolute_actions_come_back_under_their_own_key(tmp_path: Path) -> None:
     true, found = items(source), items(path)
     assert found["data/demo_1/actions_abs"].tobytes() == true["data/demo_1/actions_abs"].tobytes()
     assert "data/demo_1/actions" not in found  # which are steps, and not poses to reach
+    with pytest.raises(UserError, match="--action-key actions_abs takes these"):
+        convert([path], tmp_path / "again", SETTINGS, workers=1)
     again = convert([path], tmp_path / "again", settings, workers=1).root
     assert column(again, "action").tobytes() == column(root, "action").tobytes()
 

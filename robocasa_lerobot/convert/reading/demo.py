@@ -27,7 +27,7 @@ from robocasa_lerobot.convert.reading.hdf5 import (
     shape_and_type,
     text_attribute,
 )
-from robocasa_lerobot.convert.reading.layout import ROBOMIMIC, Layout, Picture
+from robocasa_lerobot.convert.reading.layout import ACTION_KEYS, ROBOMIMIC, Layout, Picture
 from robocasa_lerobot.convert.reading.mjcf import names_model, read_model
 
 __all__ = ["IMAGE_SUFFIX", "MAX_COLUMN_VALUES", "Demo", "RejectedEpisodeError", "SourceError", "first_line"]
@@ -51,6 +51,9 @@ class Demo:
             RejectedEpisodeError: missing, not numeric, empty, or not finite.
         """
         key = self.layout.action_key
+        other = next((other for other in ACTION_KEYS if other != key and self.layout.robot is None), None)
+        if other is not None and self.has(other) and not self.has(key):
+            raise RejectedEpisodeError(f"it has no dataset {key!r}, but {other!r}: --action-key {other} takes these.")
         column = self._column(self._group, key, dimensions=2 if self.layout.robot is None else None)
         actions = _flat(column)
         if len(actions) == 0:
