@@ -21,7 +21,7 @@ from robocasa_lerobot.convert.lerobot_v2.dataset import (
     camera_of,
 )
 from robocasa_lerobot.convert.lerobot_v2.episode import Column, V2Episode, given_instruction
-from robocasa_lerobot.convert.lerobot_v2.vectors import named_vector
+from robocasa_lerobot.convert.lerobot_v2.vectors import flat_names, named_vector
 from robocasa_lerobot.convert.mapping.robot_mapping import RobotMapping
 from robocasa_lerobot.convert.reading.demo_file import RejectedEpisodeError, SourceError
 from robocasa_lerobot.convert.reading.inputs import is_dataset
@@ -39,7 +39,7 @@ from robocasa_lerobot.convert.writing.video import probe
 from robocasa_lerobot.errors import UnknownNameError, UserError
 
 SOURCE_FORMAT = "lerobot_v2"
-_FORMAT_VERSION = 1  # as that of `convert.settings`, for these sources alone
+_FORMAT_VERSION = 2  # as that of `convert.settings`, for these sources alone
 # Copying is so fast that a shard can be longer than one of HDF5; each shard has video files of its own.
 SHARD_FRAMES = 2000
 _DTYPES = {pa.float32(): "float32", pa.float64(): "float64", pa.bool_(): "bool", pa.string(): "string"} | {
@@ -233,7 +233,8 @@ def _columns(dataset: V2Dataset, notes: list[str]) -> tuple[tuple[Column, ...], 
             continue
         if dtype != feature["dtype"]:
             notes.append(f"column {name} is declared {feature['dtype']} but stored as {dtype}: kept as stored")
-        columns.append(Column(name, dtype, feature["shape"][0], ()))
+        size = feature["shape"][0]
+        columns.append(Column(name, dtype, size, tuple(flat_names(feature.get("names"), size) or ())))
     undeclared = sorted(set(schema.names) - set(dataset.features) - set(INDEX_COLUMNS))
     if undeclared:
         notes.append(f"columns {', '.join(undeclared)} are in the tables but not declared: left out")

@@ -20,7 +20,7 @@ def named_vector(
         SourceError: it is as long as the contract's, and nothing says in which order its components are.
     """
     slices = _modality_slices(dataset, column, kind)
-    components = _flat_names(dataset.features[column.name].get("names"), column.size)
+    components = flat_names(dataset.features[column.name].get("names"), column.size)
     contract_sizes = {part.name: part.size for part in contract_parts}
     if dataset.robot_type == contract.ROBOT_TYPE and column.size == sum(contract_sizes.values()):
         names = tuple(contract.component_names(contract_parts))
@@ -63,7 +63,8 @@ def _modality_slices(dataset: V2Dataset, column: Column, kind: str) -> dict[str,
     return {name: (start, stop) for start, stop, name in found} if tiled else {}
 
 
-def _flat_names(names: Any, size: int) -> list[str] | None:
+def flat_names(names: Any, size: int) -> list[str] | None:
+    """Names of the components of a vector as `info.json` has them, or None where it has no such list of that length."""
     if isinstance(names, dict) and len(names) == 1:  # {"motors": [...]}
         names = next(iter(names.values()))
     if isinstance(names, list) and len(names) == size and all(isinstance(name, str) for name in names):
