@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from robocasa_lerobot import __version__, contract
 from robocasa_lerobot.contract import Part
-from robocasa_lerobot.convert.lerobot_v3 import EXTRA_PREFIX, ExportedDataset, ExportedEpisode
+from robocasa_lerobot.convert.lerobot_v3 import EXTRA_PREFIX, INDEX_COLUMNS, ExportedDataset, ExportedEpisode
 from robocasa_lerobot.convert.mapping.robots import ABSOLUTE_ACTION_PARTS
 from robocasa_lerobot.convert.reading.demo_file import ASSETS_GROUP, IMAGE_SUFFIX, DemoFile
 from robocasa_lerobot.convert.reading.extras import read_scene, read_states
@@ -38,6 +38,9 @@ _ROBOSUITE_ENV = 1  # robomimic's number for environments of robosuite
 # Names of the state's components of arms with a fixed base, an arm's name before each where there are several, and
 # what robosuite calls the observation that they are of.
 _ARM_COMPONENT = re.compile(r"(.*?)(?:(?P<position>eef_[xyz])|(?P<rotation>eef_q[xyzw])|(?P<fingers>finger_\d+))")
+# Columns that come back in another form: as language, as the environment's name, as stages and their texts.
+_SAID_OTHERWISE = ("task_description", "task_name")
+_WRITTEN = (*INDEX_COLUMNS, *contract.STAGE_KEYS, contract.STATE_KEY, contract.ACTION_KEY, "next.reward", "next.done")
 _ARM_ENDINGS = {"position": "eef_pos", "rotation": "eef_quat", "fingers": "gripper_qpos"}
 
 
@@ -149,6 +152,8 @@ def _write(
             num_frames += episode.length
             bar.update(episode.length)
     notes += [f"{what} of {count} episodes are not in the dataset: left out" for what, count in lacking.items()]
+    if nowhere := _without_a_place(dataset):
+        notes.append(f"columns {', '.join(nowhere)} have no place in HDF5 files of this kind: left out")
     if dataset.placed_cameras:
         placed = ", ".join(dataset.placed_cameras)
         notes.append(
@@ -211,6 +216,19 @@ def _write_vectors(
         group.attrs["seed"] = meta["seed"]
     group.attrs["num_samples"] = episode.length
     return lacking
+
+
+def _without_a_place(dataset: ExportedDataset) -> list[str]:
+    """Features of a dataset that are in no way in the file that is made of it."""
+    pictures = dataset.cameras.values()
+    return [
+        key
+        for key in dataset.features
+        if key not in _WRITTEN
+        and key not in pictures
+        and not key.startswith(EXTRA_PREFIX)
+        and not (key.startswith("annotation.") and key.endswith(_SAID_OTHERWISE))
+    ]
 
 
 def _has_parts(dataset: ExportedDataset, key: str, parts: Sequence[Part]) -> bool:

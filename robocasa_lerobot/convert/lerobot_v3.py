@@ -24,12 +24,12 @@ from robocasa_lerobot.convert.writing.statistics import column_of
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.jsonl import read_jsonl
 
-__all__ = ["EXTRA_PREFIX", "ExportedDataset", "ExportedEpisode"]
+__all__ = ["EXTRA_PREFIX", "INDEX_COLUMNS", "ExportedDataset", "ExportedEpisode"]
 
 _VERSION = "v3."
 _OURS = "meta/robocasa"
 _TIME_TOLERANCE = 0.1  # of a frame
-_INDICES = ("timestamp", "frame_index", "episode_index", "index", "task_index")
+INDEX_COLUMNS = ("timestamp", "frame_index", "episode_index", "index", "task_index")
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,7 @@ class ExportedDataset:
             key
             for key, feature in self.features.items()
             if feature["dtype"] not in ("video", "image", "string", "language")
-            and key not in _INDICES
+            and key not in INDEX_COLUMNS
             and len(feature["shape"]) == 1
         ]
         return {key: column_of(table, key) for key in numeric}

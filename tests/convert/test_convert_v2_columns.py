@@ -1,4 +1,4 @@
-"""Columns of LeRobot v2 datasets beyond state and action."""
+"""Columns of LeRobot v2 datasets beyond state and action: their names, and what becomes of them in HDF5."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import pytest
 import v2_support as v2
 
 from robocasa_lerobot import contract
+from robocasa_lerobot.convert.export import ExportSettings, export
 from robocasa_lerobot.convert.pipeline import convert
 from robocasa_lerobot.convert.settings import ConversionSettings
 
@@ -41,3 +42,8 @@ def test_every_column_keeps_the_names_of_its_components(converted: Path) -> None
     features = json.loads((converted / "meta" / "info.json").read_text(encoding="utf-8"))["features"]
     assert features["observation.effort"] == {"dtype": "float32", "shape": [3], "names": JOINTS}
     assert features["mode"]["names"] is None
+
+
+def test_export_says_which_columns_it_leaves_out(converted: Path, tmp_path: Path) -> None:
+    notes = export(converted, tmp_path / "out.hdf5", ExportSettings(images=False)).notes
+    assert notes == ("columns observation.effort, mode have no place in HDF5 files of this kind: left out",)
