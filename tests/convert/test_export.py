@@ -141,6 +141,7 @@ def test_vectors_of_a_panda_omron_need_no_names(ours: tuple[Path, Path, Path], t
 def test_robocasas_own_data_becomes_hdf5_and_comes_back(tmp_path: Path) -> None:
     source = v2.write_dataset(tmp_path / "in", (8, 5))
     root = convert([source], tmp_path / "data", SETTINGS, workers=1).root
+    assert "# Demonstrations of kitchen tasks" in (root / "README.md").read_text(encoding="utf-8")
     result = export(root, tmp_path / "out.hdf5")
     assert (result.num_episodes, result.num_frames, result.notes) == (2, 13, ())
     found = items(result.path)
@@ -161,6 +162,7 @@ def test_isaac_groot_data_has_its_whole_state_and_notes_what_is_lacking(tmp_path
     v2.edit_json(source / "meta" / "info.json", lambda info: info.update(robot_type="GR1"))
     (source / "meta" / "modality.json").unlink()
     root = convert([source], tmp_path / "data", SETTINGS, workers=1).root
+    assert "itchen" not in (root / "README.md").read_text(encoding="utf-8")  # nobody says that it was recorded in one
     result = export(root, tmp_path / "out.hdf5")
     found = items(result.path)
     assert found["data/demo_0/obs/state"].tobytes() == column(root, "observation.state").tobytes()

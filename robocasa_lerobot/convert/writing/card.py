@@ -14,6 +14,7 @@ from typing import Any
 
 import h5py
 
+from robocasa_lerobot import contract
 from robocasa_lerobot.jsonl import read_jsonl
 
 CARD = "README.md"
@@ -77,14 +78,16 @@ def _card(info: dict[str, Any], record: dict[str, Any], episodes: list[dict[str,
         else "That of the sources, which the conversion does not know: look it up, and name the authors, before you "
         "publish this."
     )
+    # Arms on tables and humanoids are converted, too.
+    kitchens = ours or info["robot_type"] == contract.ROBOT_TYPE
     lines = [
         "---",
         f"license: {_OURS if ours else 'other'}",
         "task_categories: [robotics]",
-        "tags: [LeRobot, robocasa]",
+        f"tags: [LeRobot{', robocasa' if kitchens else ''}]",
         "configs: [{config_name: default, data_files: data/*/*.parquet}]",
         "---",
-        "# Demonstrations of kitchen tasks",
+        f"# Demonstrations{' of kitchen tasks' if kitchens else ''}",
         "",
         made,
         "",
@@ -100,7 +103,7 @@ def _card(info: dict[str, Any], record: dict[str, Any], episodes: list[dict[str,
         "",
         "## Licence and attribution",
         licence,
-        "Tasks, splits and formats follow RoboCasa365 (https://robocasa.ai), which is to be cited.",
+        *(["Tasks, splits and formats follow RoboCasa365 (https://robocasa.ai), which is to be cited."] * kitchens),
         "",
         "## Loading",
         "```python",
