@@ -17,6 +17,7 @@ from full_disk import full_after
 
 from robocasa_lerobot import cli, contract
 from robocasa_lerobot.convert.export import ExportSettings, export
+from robocasa_lerobot.convert.inspect.hdf5 import describe, inspect_hdf5
 from robocasa_lerobot.convert.lerobot_v3 import ExportedDataset
 from robocasa_lerobot.convert.pipeline import convert
 from robocasa_lerobot.convert.record_files import META_FOLDER
@@ -119,6 +120,9 @@ def test_absolute_actions_come_back_under_their_own_key(tmp_path: Path) -> None:
     true, found = items(source), items(path)
     assert found["data/demo_1/actions_abs"].tobytes() == true["data/demo_1/actions_abs"].tobytes()
     assert "data/demo_1/actions" not in found  # which are steps, and not poses to reach
+    report = inspect_hdf5(path)
+    assert (report.lengths, report.problems) == ([len(found[f"data/demo_{i}/actions_abs"]) for i in range(4)], {})
+    assert "convert with --action-key actions_abs" in describe(report)
     with pytest.raises(UserError, match="--action-key actions_abs takes these"):
         convert([path], tmp_path / "again", SETTINGS, workers=1)
     again = convert([path], tmp_path / "again", settings, workers=1).root

@@ -18,7 +18,7 @@ from robocasa_lerobot.convert.mapping.robots import choose_mapping
 from robocasa_lerobot.convert.reading.demo import Demo
 from robocasa_lerobot.convert.reading.demo_file import WHOLE_FILE, DemoFile
 from robocasa_lerobot.convert.reading.hdf5 import RejectedEpisodeError
-from robocasa_lerobot.convert.reading.layout import DEFAULT_EPISODES, Layout
+from robocasa_lerobot.convert.reading.layout import ABSOLUTE_ACTIONS, ACTION_KEYS, ACTIONS, DEFAULT_EPISODES, Layout
 from robocasa_lerobot.convert.reading.mjcf import scene_names
 from robocasa_lerobot.convert.reading.safe_scan import Survey, survey
 from robocasa_lerobot.errors import UserError
@@ -147,13 +147,15 @@ def is_picture(found: DatasetShape) -> bool:
     return len(found.shape) == 4 and found.shape[3] == 3 and found.dtype == "uint8"
 
 
-def _say_action(file: DemoFile, demos: Sequence[str]) -> bool:
-    """Whether the first of some groups that opens has its actions as `action`, and not as `actions`."""
+def _known_actions(file: DemoFile, demos: Sequence[str]) -> str | None:
+    """What the first of some groups that opens calls its actions; None where that is `action`, as others call them."""
     for demo in demos:
         with contextlib.suppress(RejectedEpisodeError):
             inside = file.members(demo)
-            return "action" in inside and "actions" not in inside
-    return False
+            if "action" in inside and ACTIONS not in inside:
+                return None
+            return next((key for key in ACTION_KEYS if key in inside), ACTIONS)
+    return ACTIONS
 
 
 def _find_layout(path: Path, surveyed: Survey) -> tuple[Layout | None, tuple[str, ...]]:
@@ -161,8 +163,8 @@ def _find_layout(path: Path, surveyed: Survey) -> tuple[Layout | None, tuple[str
     with DemoFile(path, Layout(episodes="/")) as whole:  # the checks of opening, and no assumption
         groups, children_of_data = whole.members("/"), whole.members("data")
         demos = [f"data/{name}" for name in children_of_data if re.fullmatch(r"demo_[0-9]+", name)]
-        if demos and not _say_action(whole, [demo for demo in demos if not surveyed.reason(f"/{demo}")]):
-            return Layout(), groups
+        if demos and (key := _known_actions(whole, [demo for demo in demos if not surveyed.reason(f"/{demo}")])):
+            return Layout(action_key=key), groups
         shapes = whole.demo(WHOLE_FILE).shapes()
     found: Counter[tuple[str, str]] = Counter()
     children: dict[tuple[str, str], set[str]] = {}
@@ -235,6 +237,8 @@ def describe(report: FileReport) -> str:
         lines.append(f"robot: {report.mapping.robot_type}")
         for what, parts in (("state", report.mapping.state_parts), ("action", report.mapping.action_parts)):
             lines.append(f"  {what}: {', '.join(f'{part.name} {part.size}' for part in parts)}")
+        if report.layout.action_key == ABSOLUTE_ACTIONS:
+            lines.append(f"  there are absolute actions alone: convert with --action-key {ABSOLUTE_ACTIONS}")
         lines.append(f"  cameras taken by default: {', '.join(report.mapping.default_cameras)}")
     else:
         lines.append(f"robot: not recognised. {report.no_mapping}")
