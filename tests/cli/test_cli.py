@@ -214,6 +214,39 @@ def test_misspelt_policies_are_told_before_anything_runs(
 
 
 @pytest.mark.parametrize(
+    ("policies", "said"),
+    [
+        (["--policy=zero,zero"], "two policies are called 'zero'"),
+        (["--policy=zero,random", "--policy.label=a/b,a__b"], "would have one folder"),
+        (["--policy=zero", "--policy.label=.hidden"], "no leading '.'"),
+        (["--policy=replay:"], "with a colon at its end"),
+        (["--policy=zero", "--policy.label=a: b"], "is written in quotes"),
+    ],
+)
+def test_check_tells_of_labels_what_a_run_would(
+    policies: list[str], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert cli.main(["eval", "--env.tasks=OpenDrawer", "--check", *policies]) == 2
+    assert said in capsys.readouterr().err
+
+
+def test_check_says_which_policies_are_not_there_yet(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """No mistake, as a training may be about to write them; but nothing that a person wants to find out later."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "empty").mkdir()
+    there = "zero,demonstrator,openpi://127.0.0.1:8000"
+    assert cli.main(["eval", "--env.tasks=OpenDrawer", "--check", f"--policy=demo,empty,replay:a.hdf5,{there}"]) == 0
+    said = [line for line in capsys.readouterr().out.splitlines() if line.startswith("not there yet: ")]
+    assert [line.split(";")[0].removeprefix("not there yet: policy.path ") for line in said] == [
+        "demo: no such folder",
+        "empty: has no config.json",
+        "replay:a.hdf5: no such file or folder",
+    ]
+
+
+@pytest.mark.parametrize(
     ("file", "words"),
     [
         ("policies/act.yaml", "with `type` it is a policy's settings"),

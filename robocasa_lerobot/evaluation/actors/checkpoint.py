@@ -132,6 +132,32 @@ def check_name(path: str) -> None:
         raise UnknownNameError("policy", path, [f"{name}:FILE" if colon else name for name in known])
 
 
+def what_lacks(path: str) -> str | None:
+    """Why no run of the policy at `path`, which is no address, would begin yet; None where all of it is there."""
+    kind, colon, file = path.partition(":")
+    if path in REFERENCE_POLICIES:
+        return None
+    if kind == REPLAY and colon:
+        return None if Path(file).exists() else _nothing_to_replay(Path(file))
+    try:
+        find_pretrained(Path(path))
+    except CheckpointError as error:
+        return str(error)
+    return None
+
+
+def label_of(path: str) -> str | None:
+    """What the policy at `path`, no address, is called unless the user says; None where it is not there yet."""
+    if path in REFERENCE_POLICIES:
+        return path
+    if path.startswith(f"{REPLAY}:"):
+        return REPLAY
+    if what_lacks(path) is not None:
+        return None
+    folder = find_pretrained(Path(path)).resolve()
+    return default_label(read_origin(folder), folder)
+
+
 def default_label(origin: Origin, folder: Path) -> str:
     """`<experiment>/<phase>-<step>`, as far as it is known: phases of different experiments have the same names."""
     if origin.phase is None:
@@ -176,14 +202,17 @@ def stored_fingerprint(path: Path) -> str:
     """
     files = [path] if path.is_file() else sorted([*path.glob("meta/**/*.json*"), *path.glob("data/**/*.parquet")])
     if not files:
-        raise CheckpointError(
-            f"policy.path replay:{path}: expected an HDF5 file of demonstrations or a LeRobotDataset."
-        )
+        raise CheckpointError(_nothing_to_replay(path))
     digest = hashlib.sha256()
     for file in files:
         with file.open("rb") as stream:
             digest.update(hashlib.file_digest(stream, "sha256").digest())
     return digest.hexdigest()
+
+
+def _nothing_to_replay(path: Path) -> str:
+    what = "has no episodes" if path.exists() else "no such file or folder"
+    return f"policy.path {REPLAY}:{path}: {what}; expected an HDF5 file of demonstrations or a LeRobotDataset."
 
 
 def has_queues(config: Mapping[str, Any]) -> bool:

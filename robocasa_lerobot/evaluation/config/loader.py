@@ -51,6 +51,11 @@ def _check(cls: type, tree: Mapping[str, Any], prefix: str) -> dict[str, Any]:
                     f"{prefix}{key}: found {value!r}, expected settings such as --{prefix}{key}.NAME=VALUE."
                 )
             value = _check(typing.cast(type, hint), value, f"{prefix}{key}.")
+        elif typing.get_origin(hint) is list and isinstance(value, Mapping):  # YAML's, of a colon at an end or a space
+            raise ConfigError(
+                f"{prefix}{key}: found {dict(value)!r}, expected A or A,B; a text with a colon at its end or before a "
+                f"space is written in quotes that the shell leaves, --{prefix}{key}='\"A: B\"'."
+            )
         elif typing.get_origin(hint) is list and not isinstance(value, list):
             value = [] if value is None else [part.strip() for part in str(value).split(",") if part.strip()]
         out[key] = value

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.errors import UserError
-from robocasa_lerobot.evaluation.actors.checkpoint import check_name
+from robocasa_lerobot.evaluation.actors.checkpoint import check_name, what_lacks
 from robocasa_lerobot.evaluation.config.evaluation import EvaluationConfig, PolicySettings, check_factory
 from robocasa_lerobot.evaluation.config.loader import load_config
 from robocasa_lerobot.evaluation.planning.run_header import (
@@ -28,6 +28,8 @@ from robocasa_lerobot.evaluation.planning.run_header import (
     partial_sentence,
     plan_tasks,
 )
+from robocasa_lerobot.evaluation.planning.sources import check_labels, known_labels
+from robocasa_lerobot.evaluation.remote.address import is_address
 
 # Settings that leave results as they are: where they lie, where and how patiently trials run. Which policy it is, is
 # not said by the place of a checkpoint, where a later one lies in its turn.
@@ -80,6 +82,7 @@ def planned(config: EvaluationConfig) -> PlannedTasks:
     """
     for path in config.policy.path:
         check_name(path)
+    check_labels(known_labels(config))
     check_factory(config.env.factory)
     tasks = plan_tasks(config.env, config.first_sets)
     for phase in config.policy.lifelong_phase if config.lifelong else ():
@@ -123,7 +126,10 @@ def lines(config: EvaluationConfig, tasks: PlannedTasks) -> list[str]:
         lacking = tasks.missing_by_set.get(name, [])
         rest = f", without {', '.join(lacking)}" if lacking else ""
         out.append(f"  {name}: {len(members)} of {len(members) + len(lacking)} tasks{rest}")
-    return [*out, *([checked.partial] if checked.partial else [])]
+    out += [checked.partial] if checked.partial else []
+    # A training may be about to write it: no mistake yet.
+    lacks = [what_lacks(path) for path in config.policy.path if not is_address(path)]
+    return [*out, *(f"not there yet: {what}" for what in lacks if what is not None)]
 
 
 if __name__ == "__main__":

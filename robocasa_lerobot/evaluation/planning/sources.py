@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
 from robocasa_lerobot.errors import UserError
-from robocasa_lerobot.evaluation.actors.checkpoint import PolicySource, common_image_size, read_source
+from robocasa_lerobot.evaluation.actors.checkpoint import PolicySource, common_image_size, label_of, read_source
 from robocasa_lerobot.evaluation.config.evaluation import EvaluationConfig, RemoteSettings, output_folder
-from robocasa_lerobot.evaluation.records.results import TRIALS_FILE, RunHeader, read_results
+from robocasa_lerobot.evaluation.records.results import TRIALS_FILE, RunHeader, file_name, read_results
 from robocasa_lerobot.evaluation.remote.address import Address, is_address, parse_address
 from robocasa_lerobot.evaluation.remote.client import Timeouts
 from robocasa_lerobot.evaluation.remote.introduction import Introduction, RemotePolicy
@@ -34,7 +34,7 @@ def open_sources(config: EvaluationConfig, ask: bool = True) -> tuple[list[Polic
     remotes = sum(map(is_address, policy.path))
     given: list[str | None] = [*policy.keys] or [None]
     keys = iter(given if len(given) == remotes else given * remotes)
-    recorded = {} if ask or not remotes else _recorded_remotes(output_folder(config, _labels(config)))
+    recorded = {} if ask or not remotes else _recorded_remotes(output_folder(config, known_labels(config)))
     sources: list[PolicySource] = []
     asked: dict[int, Introduction] = {}
     with ExitStack() as stack:
@@ -69,11 +69,30 @@ def patience_of(settings: RemoteSettings) -> Timeouts:
     return Timeouts(settings.connect_seconds, settings.answer_seconds, settings.first_answer_seconds)
 
 
-def _labels(config: EvaluationConfig) -> list[str]:
-    paths = config.policy.path
-    return config.policy.label or [
-        default_label(parse_address(path)) if is_address(path) else read_source(path).label for path in paths
+def known_labels(config: EvaluationConfig) -> list[str]:
+    """What the policies are called, as far as that is known: a checkpoint that is not there yet says nothing."""
+    labels: Sequence[str | None] = config.policy.label or [
+        default_label(parse_address(path)) if is_address(path) else label_of(path) for path in config.policy.path
     ]
+    return [label for label in labels if label is not None]
+
+
+def check_labels(labels: Iterable[str]) -> None:
+    """Check the names of policies, which name folders as well.
+
+    Raises:
+        UserError: an empty or hidden one, or two that are the same, or would have one folder of films.
+    """
+    found: dict[str, str] = {}
+    for label in labels:
+        other = found.get(file_name(label))
+        if other == label:
+            raise UserError(f"two policies are called {label!r}: name them with --policy.label=A,B.")
+        if other is not None:
+            raise UserError(f"policy.label: {other!r} and {label!r} would have one folder; name one of them otherwise.")
+        if not label or label.startswith("."):
+            raise UserError(f"policy.label {label!r}: it names a folder, so it is not empty and has no leading '.'.")
+        found[file_name(label)] = label
 
 
 def recorded_device(out: Path) -> str | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import collections
 import dataclasses
 import sys
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,7 @@ from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.evaluation.actors.checkpoint import PolicySource
 from robocasa_lerobot.evaluation.config.evaluation import EvaluationConfig, check_factory, output_folder
 from robocasa_lerobot.evaluation.planning import run_header as resolve
-from robocasa_lerobot.evaluation.planning.sources import open_sources, recorded_device
+from robocasa_lerobot.evaluation.planning.sources import check_labels, open_sources, recorded_device
 from robocasa_lerobot.evaluation.planning.trials import Shard, TrialSpec, make_plan, running_order, to_film
 from robocasa_lerobot.evaluation.records.results import (
     REPLAY,
@@ -29,7 +29,6 @@ from robocasa_lerobot.evaluation.records.results import (
     Seconds,
     TrialKey,
     TrialRecord,
-    file_name,
     read_results,
 )
 from robocasa_lerobot.evaluation.records.trials_file import append, check_same_run, drop_torn_line
@@ -79,16 +78,8 @@ def prepare(config: EvaluationConfig, ask: bool = True, here: bool = True) -> Ev
     tasks = resolve.plan_tasks(config.env, config.first_sets)
     simulator = simulator_of(config.env.python, config.env.type, config.env.factory, config.env.options)
     sources, image_size = open_sources(config, ask)
-    by_label: dict[str, PolicySource] = {}
-    for source in sources:
-        if source.label in by_label:
-            raise UserError(f"two policies are called {source.label!r}: name them with --policy.label=A,B.")
-        if not source.label or source.label.startswith("."):
-            raise UserError(
-                f"policy.label {source.label!r}: it names a folder, so it is not empty and has no leading '.'."
-            )
-        by_label[source.label] = source
-    _check_folders(by_label)
+    check_labels(source.label for source in sources)
+    by_label = {source.label: source for source in sources}
     out = output_folder(config, list(by_label))
     device = _device(config.policy.device, any(source.is_checkpoint for source in sources), out, here)
     if device != "auto":
@@ -115,15 +106,6 @@ def _device(asked: str, needs_torch: bool, out: Path, here: bool) -> str:
     if here or not needs_torch:
         return resolve.resolve_device(asked, needs_torch)
     return asked if asked != "auto" else recorded_device(out) or asked
-
-
-def _check_folders(labels: Iterable[str]) -> None:
-    """No two labels may name one folder of films."""
-    found: dict[str, str] = {}
-    for label in labels:
-        other = found.setdefault(file_name(label), label)
-        if other != label:
-            raise UserError(f"policy.label: {other!r} and {label!r} would have one folder; name one of them otherwise.")
 
 
 def shard_folder(out: Path, shard: Shard) -> Path:
