@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
+from robocasa_lerobot.evaluation.report.numbers import listed
 from robocasa_lerobot.evaluation.statistics.averages import Estimate, linear_combination, ratio
 from robocasa_lerobot.evaluation.statistics.lifelong import Lifelong
 from robocasa_lerobot.files import write_text
@@ -155,6 +157,9 @@ def _most(part: PartConfig, rates: Mapping[str, CellRate], against: Mapping[str,
         )
     best = max(rates, key=lambda row: rates[row].rate.value)
     most = f"Most: {best}, {_percent(rates[best].rate)}"
+    alike = [row for row in rates if row != best and math.isclose(rates[row].rate.value, rates[best].rate.value)]
+    if alike:
+        most += f", as much as {listed(alike)}"
     if best in against:
         assert part.reference is not None
         return f"{most}; against {part.reference}: {_points(against[best])}{_once(rates, best, part.reference)}."

@@ -210,6 +210,16 @@ def test_two_rows_say_how_many_trainings_they_rest_on(tmp_path: Path) -> None:
     assert "the same in all rows with the same evaluation" in text.replace("\n", " ")
 
 
+def test_rows_that_reach_as_much_are_named_together(tmp_path: Path) -> None:
+    rows = {name: row(name) for name in ("few", "many", "more")}
+    part = PartConfig("Which?", rows, ["both"], 1, reference="few")
+    own = [run(name, 0, trials("train", {"A": "++--", "B": "+---"})) for name in ("many", "more")]
+    stored = {(one.experiment, one.seed): one for one in (RUNS[0], *own)}
+    write_page(StudyConfig("r", "x", {"some": part}), stored, SETS, tmp_path / "results", tmp_path / "page.md")
+    text = (tmp_path / "page.md").read_text(encoding="utf-8")
+    assert re.search(r"\nMost: many, 38 % \(.*\), as much as more; against few: \+12 \(", text)
+
+
 def phase_with_trials(folder: Path, steps: int, evaluation: str, finished: bool = True) -> None:
     """What a training leaves of a phase that has ended, with a trial of an evaluation and one in a perturbed scene."""
     line = {"step": steps, "loss": 0.5, "seconds_per_step": 0.1}
