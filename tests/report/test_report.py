@@ -33,6 +33,8 @@ from robocasa_lerobot.evaluation.report.formats.charts import (
 )
 from robocasa_lerobot.evaluation.report.gather import gather, summarize
 from robocasa_lerobot.evaluation.report.numbers import (
+    bare,
+    bare_interval,
     count,
     interval,
     listed,
@@ -44,7 +46,7 @@ from robocasa_lerobot.evaluation.report.numbers import (
 from robocasa_lerobot.evaluation.report.policies import same_trials
 from robocasa_lerobot.evaluation.report.sections.beside_published import differences
 from robocasa_lerobot.evaluation.report.training import TrainingPhase, find_trainings, read_demonstrator, read_training
-from robocasa_lerobot.evaluation.statistics import success_rate
+from robocasa_lerobot.evaluation.statistics import Estimate, success_rate
 from robocasa_lerobot.video import VideoWriter, frames_and_rate
 
 # Elements without an end tag.
@@ -347,6 +349,8 @@ def test_films_stay_within_their_budget(folder: Path) -> None:
 def test_numbers_are_written_the_same_everywhere() -> None:
     assert percent(0.12345) == "12.3\N{NO-BREAK SPACE}%"
     assert (points(0.0721), points(-0.0721), points(-0.0001)) == ("+7.2", "\N{MINUS SIGN}7.2", "0.0")
+    assert (bare(0.0721), bare(-0.0301), bare(-1e-17)) == ("7.2", "\N{MINUS SIGN}3.0", "0.0")
+    assert bare_interval(Estimate(0.03, -0.012, 0.074)) == "\N{MINUS SIGN}1.2 to 7.4"
     assert [p_value(p) for p in (0.00001, 0.0123, 0.5, 1.0)] == ["< 0.001", "0.012", "0.50", "1.00"]
     assert [published(v) for v in (1.25, 15.0)] == ["1.25\N{NO-BREAK SPACE}%", "15.0\N{NO-BREAK SPACE}%"]
     assert [count(1, "task"), count(2500, "trial")] == ["1 task", "2,500 trials"]

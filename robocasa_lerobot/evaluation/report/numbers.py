@@ -16,8 +16,8 @@ def percent(value: float) -> str:
 
 
 def bare(value: float) -> str:
-    """The same without the sign, for tables whose caption says percent."""
-    return f"{100 * value:.1f}"
+    """A rate or a loss without the sign of percent, for tables whose caption says it; a loss may be a gain."""
+    return _with_minus(f"{100 * value:.1f}")
 
 
 def published(value: float) -> str:
@@ -31,19 +31,22 @@ def interval(rate: Rate | Estimate) -> str:
 
 
 def bare_interval(rate: Rate | Estimate) -> str:
-    """The same without the sign."""
-    return f"{100 * rate.low:.1f}{DASH}{100 * rate.high:.1f}"
+    """Its interval, e.g. `−1.2 to 7.4`."""
+    return f"{bare(rate.low)} to {bare(rate.high)}"
 
 
 def points(difference: float) -> str:
     """A difference of rates in percentage points with its sign, e.g. `+7.2`."""
-    text = f"{100 * difference:+.1f}"
-    return "0.0" if float(text) == 0 else text.replace("-", MINUS)
+    return _with_minus(f"{100 * difference:+.1f}")
 
 
 def points_interval(difference: Estimate) -> str:
     """The interval of a difference in percentage points, e.g. `+5.0 to +9.4`."""
     return f"{points(difference.low)} to {points(difference.high)}"
+
+
+def _with_minus(text: str) -> str:
+    return "0.0" if float(text) == 0 else text.replace("-", MINUS)
 
 
 def p_value(p: float) -> str:

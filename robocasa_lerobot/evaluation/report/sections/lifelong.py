@@ -73,8 +73,8 @@ def sentence(data: ReportData) -> str | None:
     if last in result.forgetting:
         lost = result.forgetting[last]
         text += (
-            f"; of what earlier phases had reached, {100 * lost.value:.1f} points are forgotten (95 % interval "
-            f"{100 * lost.low:.1f} to {100 * lost.high:.1f})"
+            f"; of what earlier phases had reached, {fmt.bare(lost.value)} points are forgotten (95 % interval "
+            f"{fmt.bare_interval(lost)})"
         )
     later = max(found[-1].policies)
     return text + (f"; phase {later} was not evaluated on all tasks." if later > last else ".")
@@ -104,7 +104,7 @@ def _heat_map(result: Lifelong, series: LifelongSeries, end: str, of: str) -> Ta
         cells.append(
             Cell(fmt.NONE)
             if lost is None
-            else Cell(f"{100 * lost.value:.1f}", 100 * lost.value, fmt.bare_interval(lost), strong=True)
+            else Cell(fmt.bare(lost.value), 100 * lost.value, fmt.bare_interval(lost), strong=True)
         )
         rows.append(tuple(cells))
     return Table(
