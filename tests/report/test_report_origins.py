@@ -16,7 +16,7 @@ from robocasa_lerobot.evaluation.records.results import REFERENCE_POLICIES, REPL
 from robocasa_lerobot.evaluation.report.gather import gather
 from robocasa_lerobot.evaluation.report.numbers import seconds
 from robocasa_lerobot.evaluation.report.policies import REFERENCES, describe_policy
-from robocasa_lerobot.evaluation.report.sections import comparison, provenance
+from robocasa_lerobot.evaluation.report.sections import comparison, provenance, summary
 
 TASKS = {"OpenDrawer": 0.6, "CloseDrawer": 0.6}
 PUSHT = {"factory": "lerobot", "type": "lerobot:pusht", "simulator": {"adapter": "0"}}
@@ -87,3 +87,36 @@ def test_settings_are_those_of_every_run_that_was_continued(tmp_path: Path) -> N
     assert rows["processor"] == "none: these trials were drawn at random, another"
     assert rows["mujoco"] == "3.17.0, 3.18.0"
     assert rows["device"] == "synthetic"
+
+
+def test_policies_and_tasks_are_in_the_order_of_the_plan(tmp_path: Path) -> None:
+    """Whichever trials ended first: long horizons run first, and workers overtake each other."""
+    about = [synthetic_runs.policy(label) for label in ("first", "second")]
+    head = synthetic_runs.header("custom", about, list(TASKS), task_sets={}, trials=2)
+    records = [record for one in about for record in synthetic_runs.trials(head, one.label, TASKS, 2)]
+    data = gather([synthetic_runs.write(tmp_path / "run", head, records[::-1])])
+    assert [policy.label for policy in data.policies] == ["first", "second"]
+    assert data.task_names == tuple(TASKS)
+
+
+def test_only_what_has_weights_is_said_to_have_them(tmp_path: Path) -> None:
+    kinds = {"zero": "zero", "replay": "replay:demos.hdf5", "mine": "mine"}
+    about = [
+        synthetic_runs.policy(kind, type="act" if kind == "mine" else kind, path=path) for kind, path in kinds.items()
+    ]
+    head = synthetic_runs.header("custom", about, list(TASKS), task_sets={}, trials=1)
+    records = [record for one in about for record in synthetic_runs.trials(head, one.label, TASKS, 1)]
+    parts = provenance.section(gather([synthetic_runs.write(tmp_path / "run", head, records)])).parts
+    names = {part.title: {name for name, _ in part.items} & {"weights", "stored actions"} for part in parts[1:]}  # type: ignore[union-attr]
+    assert names == {"zero": set(), "replay": {"stored actions"}, "mine": {"weights"}}
+
+
+def test_an_interval_to_one_side_is_told_as_far_as_it_reaches(tmp_path: Path) -> None:
+    about = synthetic_runs.policy("mine")
+    head = synthetic_runs.header("custom", [about], list(TASKS), task_sets={}, trials=3)
+    records = synthetic_runs.trials(head, "mine", dict.fromkeys(TASKS, 0.0), 3)
+    said = summary.how_sure(gather([synthetic_runs.write(tmp_path / "run", head, records)]))
+    # Wilson's interval of 0 of 3 ends at 56.1 %, that of 0 of 6 at 39.0 %.
+    assert said.startswith(
+        "One task's rate may be up to 56 points off (95 % intervals), the average over 2 tasks up to 39.0."
+    )

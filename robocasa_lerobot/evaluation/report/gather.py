@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from robocasa_lerobot import contract
@@ -104,8 +104,12 @@ def _seconds(trials: Sequence[TrialRecord], fps: float | None) -> tuple[float | 
 
 
 def _policies(results: Results) -> list[PolicyResult]:
+    # In the order of the plan: that in which trials end depends on horizons, workers and machines.
+    order = _places(name for header in results.headers.values() for name in header.policies)
+    places = _places(name for header in results.headers.values() for name in header.tasks)
+    last = len(places)
     by_label: dict[str, dict[str, dict[str, list[TrialRecord]]]] = {}
-    for record in results.trials:
+    for record in sorted(results.trials, key=lambda one: (order[one.label], places.get(one.task, last))):
         conditions = by_label.setdefault(record.label, {})
         conditions.setdefault(record.perturbation, {}).setdefault(record.task, []).append(record)
     out = []
@@ -117,6 +121,10 @@ def _policies(results: Results) -> list[PolicyResult]:
         folder, file = results.path.parent, results.path.name
         out.append(PolicyResult(label_under(label, names[0]), folder, info, headers, tasks, planned=planned, file=file))
     return sorted(out, key=_training_order)
+
+
+def _places(names: Iterable[str]) -> dict[str, int]:
+    return {name: place for place, name in enumerate(dict.fromkeys(names))}
 
 
 def _own_fps(header: RunHeader) -> float | None:

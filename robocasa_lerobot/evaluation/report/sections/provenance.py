@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from robocasa_lerobot.evaluation.records.results import UNPERTURBED, PolicyInfo
+from robocasa_lerobot.evaluation.records.results import REFERENCE_TYPES, REPLAY, UNPERTURBED, PolicyInfo
 from robocasa_lerobot.evaluation.report.left_out import lacking
 from robocasa_lerobot.evaluation.report.model import Block, Listing, Section
 from robocasa_lerobot.evaluation.report.policies import PolicyResult, ReportData, describe_policy
@@ -31,7 +31,11 @@ def section(data: ReportData) -> Section:
 
 
 def _what_decided(info: PolicyInfo) -> list[tuple[str, str]]:
-    """What made the actions: weights that were hashed, or a server that was asked."""
+    """What made the actions: weights or stored actions that were hashed, or a server that was asked."""
+    if info.type == REPLAY:
+        return [("stored actions", f"{info.fingerprint} (SHA-256)")]
+    if info.type in REFERENCE_TYPES:  # without any weights
+        return []
     if info.remote is None:
         return [("weights", f"{info.fingerprint} (SHA-256)")]
     remote = flat(info.remote)

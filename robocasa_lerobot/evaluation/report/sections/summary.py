@@ -76,12 +76,12 @@ def what_was_run(data: ReportData) -> str:
     policies = data.single
     trials = sum(r.rate.trials for policy in policies for tasks in policy.conditions.values() for r in tasks)
     per_task = sorted({r.rate.trials for policy in policies for r in policy.tasks})
-    each = f"{per_task[0]}" if len(per_task) == 1 else f"{per_task[0]} to {per_task[-1]}"
+    each = fmt.count(per_task[0], "trial") if len(per_task) == 1 else f"{per_task[0]} to {per_task[-1]} trials"
     splits = fmt.listed(sorted({beside_published.SPLITS.get(p.header.split, p.header.split) for p in policies}))
     rules = fmt.listed(sorted({beside_published.horizon_phrase(p) for p in policies}))
     success = fmt.listed(sorted({beside_published.success_phrase(p) for p in policies}))
     text = (
-        f"{fmt.count(len(policies), 'policy', 'policies')}, {fmt.count(len(data.task_names), 'task')}, {each} trials "
+        f"{fmt.count(len(policies), 'policy', 'policies')}, {fmt.count(len(data.task_names), 'task')}, {each} "
         f"of each: {fmt.count(trials, 'trial')} in {splits}. A trial lasts up to {rules} and is solved {success}."
     )
     text = " ".join([text, *beside_published.simulators(data.policies)])
@@ -92,13 +92,14 @@ def what_was_run(data: ReportData) -> str:
 
 
 def how_sure(data: ReportData) -> str:
-    """Widths of the intervals."""
+    """How far the intervals reach: near 0 and 100 % to one side only."""
     last = data.policies[-1]
-    widths = [(r.rate.high - r.rate.low) / 2 for r in last.tasks]
-    text = f"One task's rate is known to about ±{100 * max(widths):.0f} points (95 % intervals)"
-    if len(widths) > 1:
-        half = (last.average.high - last.average.low) / 2
-        text += f", the average over {len(widths)} tasks to about ±{100 * half:.1f}"
+    reach = [max(r.rate.high - r.rate.rate, r.rate.rate - r.rate.low) for r in last.tasks]
+    text = f"One task's rate may be up to {100 * max(reach):.0f} points off (95 % intervals)"
+    if len(reach) > 1:
+        average = last.average
+        far = max(average.high - average.value, average.value - average.low)
+        text += f", the average over {len(reach)} tasks up to {100 * far:.1f}"
     scenes = "kitchens" if last.simulator is None else "scenes"
     return text + f". Intervals speak about these tasks in {scenes} drawn like these, not about other tasks."
 
