@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import synthetic_runs
 
-from robocasa_lerobot.evaluation.records.results import UNPERTURBED
+from robocasa_lerobot.evaluation.records.results import TRIALS_FILE, UNPERTURBED
 from robocasa_lerobot.evaluation.report import comparable, output
 from robocasa_lerobot.evaluation.report import numbers as fmt
 from robocasa_lerobot.evaluation.report.formats.film_strip import choose_films
@@ -142,3 +142,26 @@ def test_a_damaged_film_is_as_one_that_is_missing(tmp_path: Path) -> None:
     assert len(choose_films(shown)) == 1
     film.write_bytes(film.read_bytes()[:400])
     assert choose_films(shown) == []
+
+
+@pytest.mark.parametrize(
+    ("changes", "rates", "why"),
+    [
+        ({"split": "pretrain"}, None, "they differ in kitchens."),
+        ({"render_preset": "quality"}, None, "they differ in rendering."),
+        ({}, {"TurnOnStove": 0.5}, "they differ in tasks."),
+        ({"seed": 1}, None, "they differ in seeds."),
+        ({}, None, "their scenes are not the same ones."),
+    ],
+)
+def test_policies_without_common_trials_are_said_to_have_none(
+    changes: dict[str, Any], rates: dict[str, float] | None, why: str, tmp_path: Path
+) -> None:
+    old = a_run(tmp_path, "old", rates, trials=9, **changes)
+    if why in ("they differ in seeds.", "their scenes are not the same ones."):
+        lines = (old / TRIALS_FILE).read_text(encoding="utf-8")
+        (old / TRIALS_FILE).write_text(lines.replace('"seed": 100', '"seed": 200'), encoding="utf-8")
+    data = gather([old, a_run(tmp_path, "new", trials=9)])
+    said = dict(summary.section(data).sentences)["Comparison"]
+    assert said == f"new and old have no trial in common, so that nothing says which is better: {why}"
+    assert comparison.section(data) is None

@@ -30,6 +30,11 @@ def same_tasks(a: PolicyResult, b: PolicyResult) -> bool:
     return {result.task for result in a.tasks} == {result.task for result in b.tasks}
 
 
+def common_tasks(a: PolicyResult, b: PolicyResult) -> set[str]:
+    """The tasks that both were tried on."""
+    return {result.task for result in a.tasks} & {result.task for result in b.tasks}
+
+
 def warnings(policies: Sequence[PolicyResult]) -> tuple[str, ...]:
     """A sentence about columns of a table that were not tried as the last one was; none where all were."""
     if not policies:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from dataclasses import dataclass
 
+from robocasa_lerobot.evaluation.report import comparable
 from robocasa_lerobot.evaluation.report import numbers as fmt
 from robocasa_lerobot.evaluation.report.model import Cell, Column, Section, Table
 from robocasa_lerobot.evaluation.report.policies import PolicyResult, ReportData, is_reference, same_trials
@@ -76,10 +77,13 @@ def _main_policies(data: ReportData) -> tuple[PolicyResult, PolicyResult] | None
 
 
 def sentence(data: ReportData) -> str | None:
-    """The main comparison in plain words."""
-    pair = main_pair(data)
-    if pair is None:
+    """The main comparison in plain words, or why there is none; None where there is one policy."""
+    wanted = _main_policies(data)
+    if wanted is None:
         return None
+    pair = make_pair(*wanted)
+    if pair is None:
+        return _nothing_in_common(*wanted)
     overall, tasks = pair.comparison.overall, pair.comparison.tasks
     difference = overall.difference
     on = f"on the same {fmt.count(overall.pairs, 'trial')}"
@@ -121,6 +125,17 @@ def sentence(data: ReportData) -> str | None:
     else:
         text += " So few trials cannot show any difference."
     return text
+
+
+def _nothing_in_common(a: PolicyResult, b: PolicyResult) -> str:
+    what = [] if comparable.common_tasks(a, b) else ["tasks"]
+    what += comparable.differences(a, b)
+    what += ["perturbations"] if a.condition != b.condition else []
+    what += ["rendering"] if a.header.render_preset != b.header.render_preset else []
+    what += ["seeds"] if a.header.seed != b.header.seed else []
+    # The same seed draws another scene in another version.
+    why = f"they differ in {fmt.listed(what)}" if what else "their scenes are not the same ones"
+    return f"{b.label} and {a.label} have no trial in common, so that nothing says which is better: {why}."
 
 
 def _p(value: float) -> str:
