@@ -41,10 +41,10 @@ def configure(parser: argparse.ArgumentParser) -> None:
     )
     short = "what to evaluate, short for --policy.path: a checkpoint, openpi://HOST:PORT, demonstrator, random, zero"
     parser.add_argument("--policy", dest="set:policy", metavar="A,B", default=argparse.SUPPRESS, help=short)
-    for name, hint, help_text in describe_settings(EvaluationConfig):
+    for name, hint, help_text, default in describe_settings(EvaluationConfig):
         options: dict[str, Any] = {"nargs": "?", "const": "true"} if hint is bool else {}
-        shown = {list[str]: "A,B", bool: "true"}.get(hint, "VALUE")
-        text = help_text.replace("%", "%%")
+        shown = {list[str]: "A,B", bool: "true|false"}.get(hint, "VALUE")
+        text = _with_default(help_text, default).replace("%", "%%")
         parser.add_argument(
             f"--{name}", dest=f"set:{name}", metavar=shown, default=argparse.SUPPRESS, help=text, **options
         )
@@ -131,8 +131,8 @@ def _run_elsewhere(config: EvaluationConfig, args: argparse.Namespace) -> int:
     return 0
 
 
-def describe_settings(cls: type, prefix: str = "") -> Iterator[tuple[str, Any, str]]:
-    """(dotted name, type, help) of each leaf setting of a dataclass; the help is its docstring's `name: text` line."""
+def describe_settings(cls: type, prefix: str = "") -> Iterator[tuple[str, Any, str, Any]]:
+    """(dotted name, type, help, default) of each leaf setting of a dataclass; help is its docstring's `name: text`."""
     hints = typing.get_type_hints(cls)
     documented = _documented(inspect.getdoc(cls) or "")
     for field in dataclasses.fields(cls):
@@ -140,7 +140,16 @@ def describe_settings(cls: type, prefix: str = "") -> Iterator[tuple[str, Any, s
         if dataclasses.is_dataclass(hint):
             yield from describe_settings(typing.cast(type, hint), f"{prefix}{field.name}.")
         else:
-            yield f"{prefix}{field.name}", hint, documented[field.name]
+            default = field.default if field.default_factory is dataclasses.MISSING else field.default_factory()
+            yield f"{prefix}{field.name}", hint, documented[field.name], default
+
+
+def _with_default(text: str, default: Any) -> str:
+    """A setting's help with its default, where it has one and the help does not say which."""
+    if default in (None, [], {}) or "default" in text.lower():
+        return text
+    shown = ",".join(default) if isinstance(default, list) else str(default)
+    return f"{text.removesuffix('.')} (default: {shown.lower() if isinstance(default, bool) else shown})."
 
 
 def _documented(doc: str) -> dict[str, str]:

@@ -39,7 +39,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--preset", default="fast", help="render preset of starts: fast or quality (default fast)")
     parser.add_argument("--image-size", type=int, default=256, help="height and width of camera pictures (default 256)")
-    parser.add_argument("--overview-size", default="1280x720", help="size of the view of the whole kitchen")
+    parser.add_argument(
+        "--overview-size", default="1280x720", help="of the view of the whole kitchen (default %(default)s)"
+    )
     parser.add_argument(
         "--format", choices=["png", "jpg"], default="png", help="of the pictures of starts (default png)"
     )

@@ -14,20 +14,34 @@ EXAMPLE = "robocasa-lerobot leaderboard outputs/evaluations/mine -o submission.j
 def configure(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument("results", nargs="?", type=Path, metavar="RUN", help="folder with a trials.jsonl")
-    parser.add_argument("--out", "-o", type=Path, default=Path("submission.json"), metavar="FILE", help="JSON to write")
+    parser.add_argument(
+        "--out",
+        "-o",
+        type=Path,
+        default=Path("submission.json"),
+        metavar="FILE",
+        help="JSON to write (default: %(default)s)",
+    )
     parser.add_argument("--policy", default=None, metavar="LABEL", help="which policy, where the run has several")
     parser.add_argument("--check", type=Path, default=None, metavar="FILE", help="only check an existing submission")
     facts = parser.add_argument_group("facts that no results file knows")
     facts.add_argument("--model-name", help="how the model is called")
     facts.add_argument("--policy-family", help="e.g. VLA or Diffusion Policy; default: the policy's type")
     facts.add_argument("--date", metavar="YYYY-MM-DD", help="default: today")
-    facts.add_argument("--submission-source", choices=("external", "internal"), default="external")
-    facts.add_argument("--open-source", choices=("yes", "no"), default="yes")
-    facts.add_argument("--code-url", default="N/A", metavar="URL")
-    facts.add_argument("--checkpoint-url", default="N/A", metavar="URL")
-    facts.add_argument("--paper-link", default="N/A", metavar="URL")
+    facts.add_argument(
+        "--submission-source",
+        choices=("external", "internal"),
+        default="external",
+        help="internal: of RoboCasa's own team (default: %(default)s)",
+    )
+    facts.add_argument(
+        "--open-source", choices=("yes", "no"), default="yes", help="whether the code is public (default: %(default)s)"
+    )
+    facts.add_argument("--code-url", default="N/A", metavar="URL", help="of the code (default: %(default)s)")
+    facts.add_argument("--checkpoint-url", default="N/A", metavar="URL", help="of the weights (default: %(default)s)")
+    facts.add_argument("--paper-link", default="N/A", metavar="URL", help="of a paper (default: %(default)s)")
     facts.add_argument("--commit-hash", help="default: the commit that the run was made with")
-    facts.add_argument("--wandb", metavar="URL")
+    facts.add_argument("--wandb", metavar="URL", help="of the training's curves (default: none)")
     facts.add_argument("--batch-size", type=int, help="global batch; default: from a checkpoint that was trained here")
     facts.add_argument("--num-training-steps", type=int, help="default: from the checkpoint")
     facts.add_argument("--notes", default="", help="added to the notes on simulator, trials and intervals")

@@ -34,7 +34,8 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "--device",
         choices=DEVICES,
         default=CPU,
-        help="cuda: a larger policy, pictures twice as large each way, eight times the batch, a quarter of the steps",
+        help="cuda: a larger policy, pictures twice as large each way, eight times the batch, a quarter of the steps "
+        "(default %(default)s)",
     )
     parser.add_argument("--workers", type=int, help="processes that make data (default: all cores)")
     parser.add_argument(

@@ -52,7 +52,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--policy-keys", default="", help="key map of a policy behind a socket, as eval's --policy.keys"
     )
-    parser.add_argument("--device", default="auto", help="that the policy computes on: auto, cpu, cuda, cuda:1, mps")
+    parser.add_argument(
+        "--device", default="auto", help="that the policy computes on: auto (default), cpu, cuda, cuda:1, mps"
+    )
 
 
 def run(args: argparse.Namespace) -> int:

@@ -23,7 +23,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "--resume",
         choices=("auto", "force"),
         default="auto",
-        help="auto: continue what was begun, if its settings are the same; force: even if they are not",
+        help="auto (default): continue what was begun, if its settings are the same; force: even if they are not",
     )
     parser.add_argument(
         "--stop_after", type=_steps, metavar="STEPS", help="save and end after so many steps of this run"

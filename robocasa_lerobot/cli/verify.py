@@ -34,7 +34,13 @@ def configure(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="steps of each episode whose pictures are compared, or `all` (default: %(default)s)",
     )
-    parser.add_argument("--min-psnr", type=float, default=25.0, metavar="DB", help="default: %(default)s dB")
+    parser.add_argument(
+        "--min-psnr",
+        type=float,
+        default=25.0,
+        metavar="DB",
+        help="how alike pictures must be (default: %(default)s dB)",
+    )
     parser.add_argument("--workers", type=int, help="processes (default: by the number of episodes and cores)")
     parser.add_argument("--report", choices=("table", "json"), default="table", help="default: %(default)s")
 

@@ -9,7 +9,7 @@ EXAMPLE = "robocasa-lerobot view --task OpenDrawer --split pretrain --seed 3 --w
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Add the arguments."""
-    parser.add_argument("--task", default="PickPlaceCounterToSink", help="task name")
+    parser.add_argument("--task", default="PickPlaceCounterToSink", help="task name (default %(default)s)")
     parser.add_argument("--split", default="target", help="kitchens: target or pretrain (default target)")
     parser.add_argument("--seed", type=int, default=0, help="of the scene (default 0)")
     parser.add_argument("--layout", type=int, help="layout id, with --style, instead of the split's choice")

@@ -32,6 +32,29 @@ def test_help_shows_an_example(name: str, capsys: pytest.CaptureFixture[str]) ->
 
 
 @pytest.mark.parametrize("name", cli.SUBCOMMANDS)
+def test_help_says_of_each_option_what_it_is_and_its_default(name: str) -> None:
+    for option in cli._subparser(cli.build_parser([name]), name)._actions:
+        if option.help == argparse.SUPPRESS:
+            continue
+        assert option.help, f"{option.option_strings or option.dest} has no help"
+        if option.option_strings and option.nargs != 0 and option.default not in (None, "", [], (), argparse.SUPPRESS):
+            assert "default" in option.help, f"{option.option_strings} does not say its default, {option.default!r}"
+
+
+def test_help_of_an_evaluation_says_the_defaults_of_its_settings(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        cli.main(["eval", "--help"])
+    shown = " ".join(capsys.readouterr().out.split())
+    assert "trials of each policy on each task (default: 10)." in shown
+    assert "perturbation.names A,B none," in shown
+    assert "trials run under each of them (default: none)." in shown
+    assert (
+        "--report [true|false] write the report at the end: report.html, .md, .tex and two .csv (default: true)."
+        in shown
+    )
+
+
+@pytest.mark.parametrize("name", cli.SUBCOMMANDS)
 def test_example_parses(name: str) -> None:
     """The example of the help text is a command line that the parser accepts."""
     parser = cli.build_parser([name])

@@ -264,7 +264,7 @@ TOGETHER = {
 
 
 def test_the_name_of_a_planned_evaluation_changes_with_what_its_results_depend_on() -> None:
-    assert OTHER_SETTINGS.keys() | TOGETHER == {name for name, _, _ in describe_settings(EvaluationConfig)}
+    assert OTHER_SETTINGS.keys() | TOGETHER == {name for name, *_ in describe_settings(EvaluationConfig)}
     common = ["--policy.path=zero", "--env.tasks=OpenDrawer", "--trials=2"]
     plain = check(common)
     same = set()
