@@ -187,6 +187,10 @@ def main(argv: Sequence[str] | None = None, own_process: bool | None = None) -> 
             args.settings = unknown
         args.own_process = argv is None if own_process is None else own_process
         check_workers(getattr(args, "workers", None))
+        if hasattr(args, "executor"):
+            from robocasa_lerobot.jobs.executors import check_options
+
+            check_options(args)
         with rare_collections():
             return int(args.run(args) or 0)
     except UserError as error:

@@ -111,6 +111,25 @@ def add_options(parser: argparse.ArgumentParser) -> None:
             )
 
 
+def check_options(args: argparse.Namespace) -> None:
+    """Refuse options of an executor that is not asked for: the work would run on this machine without a word.
+
+    Raises:
+        UserError: such an option was given, and the command runs something.
+    """
+    if getattr(args, "merge", False):  # runs nothing: the same command as before, with another last word
+        return
+    given = vars(args)
+    for kind, settings in (("slurm", SlurmSettings), ("ray", RaySettings)):
+        names = [option.name for option in fields(settings) if given[f"{kind}.{option.name}"] != option.default]
+        if names and args.executor != kind:
+            where = "on this machine" if args.executor == "local" else f"on {args.executor.capitalize()}"
+            raise UserError(
+                f"--{kind}.{names[0]} is for --executor {kind}, and the command would run {where}. Give --executor "
+                f"{kind} too, or leave --{kind}.{names[0]} out."
+            )
+
+
 def execution_of(args: argparse.Namespace) -> Execution:
     """What the options of `add_options` (and `--workers`) ask for."""
     given = vars(args)

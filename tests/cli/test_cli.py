@@ -200,6 +200,27 @@ def test_what_would_be_left_out_without_a_word_is_told(
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize("name", cli.SUBCOMMANDS)
+def test_options_of_an_executor_that_is_not_asked_for_are_told(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Instead of hours of work on a login node."""
+    monkeypatch.chdir(tmp_path)
+    parser = cli.build_parser([name])
+    example = str(sys.modules[cli.SUBCOMMANDS[name].module].EXAMPLE).strip().splitlines()[0]  # type: ignore[attr-defined]
+    words = example.split("#")[0].split()[1:]
+    if not hasattr(parser.parse_known_args(words)[0], "executor"):
+        return
+    assert cli.main([*words, "--slurm.partition", "gpu"]) == 2
+    assert (
+        "--slurm.partition is for --executor slurm, and the command would run on this machine"
+        in capsys.readouterr().err
+    )
+    assert cli.main([*words, "--executor", "slurm", "--ray.cpus=4"]) == 2
+    assert "--ray.cpus is for --executor ray, and the command would run on Slurm" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
 def test_misspelt_options_are_told_with_the_closest(capsys: pytest.CaptureFixture[str]) -> None:
     """Also where argparse would miss what was meant by it; hyphens and underscores are the same."""
     assert cli.main(["demos", "--task=OpenDrawer", "--out=x"]) == 2
