@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from robocasa_lerobot.envs.kitchens.layout import Layout, load_layout
 from robocasa_lerobot.envs.rendering import SceneRenderer
+from robocasa_lerobot.envs.rendering.canvas import BACKDROP_GROUP
 from robocasa_lerobot.envs.scene.assembly import bare_kitchen
 
 Picture = NDArray[np.uint8]
@@ -52,7 +53,8 @@ def kitchen_plan(layout_id: int, style_id: int, size: tuple[int, int] = (480, 48
     hidden = {name for name, f in layout.fixtures.items() if f.pos[2] - f.height / 2 > 1.3}
     for geom in range(model.ngeom):
         root = model.body(int(model.body_rootid[model.geom_bodyid[geom]])).name
-        if low[geom] > _CUT_M or root in hidden:
+        # The shell around the room has a ceiling, too.
+        if low[geom] > _CUT_M or root in hidden or model.geom_group[geom] == BACKDROP_GROUP:
             model.geom_group[geom] = _HIDDEN_GROUP
     camera = mujoco.MjvCamera()
     camera.lookat = [room["x_max"] / 2, room["y_min"] / 2, 0.0]
