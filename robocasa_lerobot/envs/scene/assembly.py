@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import mujoco
+import numpy as np
 
 from robocasa_lerobot.envs.kitchens.layout import Layout
 from robocasa_lerobot.envs.kitchens.materials import MaterialPalette, load_style
 from robocasa_lerobot.envs.kitchens.surroundings import add_surroundings
 from robocasa_lerobot.envs.physics.options import apply_simulation_options
+
+_BELOW_CEILING_M = 0.1  # of the light that casts shadows: below the lamps
 
 
 def bare_kitchen(layout: Layout, render_preset: str = "fast") -> tuple[mujoco.MjSpec, MaterialPalette]:
@@ -42,13 +45,35 @@ def _light(spec: mujoco.MjSpec, layout: Layout, render_preset: str) -> None:
     room = layout.room
     spec.stat.extent = 1.0
     spec.stat.center = [(room["x_min"] + room["x_max"]) / 2, room["y_min"] / 2, 1.0]
-    middle = spec.stat.center[0]
-    for name, position, direction, strength, shadow in (
-        ("ceiling_light", [middle, room["y_min"] * 0.7, room["height"]], [0.14, 0.40, -1.0], 0.43, True),
-        ("window_light", [middle, -0.2, 2.2], [-0.55, -0.35, -0.8], 0.17, False),
-    ):
+    shadows = render_preset == "quality"
+    if shadows:  # all of the room; MuJoCo's own is a metre around the light
+        visual.map.shadowclip = float(np.hypot(room["x_max"] - room["x_min"], room["y_min"])) / 2
+    for name, position, direction, strength, casts in _lights(layout, shadows):
         light = spec.worldbody.add_light(name=name, pos=position, dir=direction)
         light.type = mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
         light.diffuse = [strength, strength, strength * 0.97]
-        light.specular = [0.25, 0.25, 0.25]
-        light.castshadow = shadow and render_preset == "quality"
+        # Of a light that grazes a face a rounding error decides whether it shines.
+        light.specular = [0.0 if 0.0 in direction else 0.25] * 3
+        light.castshadow = casts
+
+
+def _lights(layout: Layout, shadows: bool) -> list[tuple[str, list[float], list[float], float, bool]]:
+    """Name, position, direction, strength, and whether it casts shadows, of each light.
+
+    Only what is in front of a light's plane casts shadows: of one that leans, ceiling and walls would shade half the
+    room. So where there are shadows the ceiling's light comes in two, straight down from below the ceiling and level:
+    upright and level faces look as they do in the light of the one.
+    """
+    room = layout.room
+    middle, deep, high = (room["x_min"] + room["x_max"]) / 2, room["y_min"], room["height"]
+    across, along, strength = 0.14, 0.40, 0.43
+    window = ("window_light", [middle, -0.2, 2.2], [-0.55, -0.35, -0.8], 0.17, False)
+    if not shadows:
+        return [("ceiling_light", [middle, deep * 0.7, high], [across, along, -1.0], strength, False), window]
+    level = float(np.hypot(across, along))
+    down = strength / float(np.hypot(level, 1.0))
+    return [
+        ("ceiling_light", [middle, deep / 2, high - _BELOW_CEILING_M], [0.0, 0.0, -1.0], down, True),
+        ("level_light", [middle, deep, high / 2], [across, along, 0.0], down * level, False),
+        window,
+    ]
