@@ -282,6 +282,14 @@ def test_a_saucepan_with_a_lid_names_its_lid_and_liquids_only_look():
     assert liquid.conaffinity[0] == 0
 
 
+@pytest.mark.parametrize("name", ["cup", "jug", "mug", "pan", "pot", "saucepan", "saucepan_with_lid", "tupperware"])
+def test_liquids_have_the_shape_of_what_holds_them(name):
+    spec = mujoco.MjSpec()
+    add_object(spec, MaterialPalette(spec, load_style(style_ids()[0])), name, item_of(name), liquid=(0.7, 0.8, 0.9, 1))
+    box, cylinder = mujoco.mjtGeom.mjGEOM_BOX, mujoco.mjtGeom.mjGEOM_CYLINDER
+    assert spec.compile().geom(f"{name}_liquid").type == (box if name == "tupperware" else cylinder)
+
+
 @pytest.mark.slow
 def test_the_cup_of_a_task_shows_the_coffee_that_is_in_it():
     scene = build_scene(get_task("MakeIcedCoffee"), "target", 0)

@@ -25,6 +25,8 @@ _KINDS = {
     "cylinder": mujoco.mjtGeom.mjGEOM_CYLINDER,
     "ellipsoid": mujoco.mjtGeom.mjGEOM_ELLIPSOID,
 }
+# Insides that are about as long as wide are round: with facets and handles, they differ by 5 percent at most.
+_ROUND_RATIO = 1.15
 
 
 def add_object(
@@ -121,9 +123,9 @@ def _add_liquid(body: mujoco.MjsBody, palette: MaterialPalette, name: str, item:
     half_z = inside.half[2] * level
     where = (inside.center[0], inside.center[1], inside.center[2] - inside.half[2] + half_z)
     material = palette.plain(rgba, 0.8)
-    round_ = item.category.typical_size[0] == item.category.typical_size[1] or item.category.tied
-    if round_ and abs(inside.half[0] - inside.half[1]) < 1e-6:
-        radius = inside.half[0] * 1.3
+    narrow, wide = sorted(inside.half[:2])
+    if wide < _ROUND_RATIO * narrow:
+        radius = narrow * 1.3  # what it holds is a square within the circle
         geom = body.add_geom(
             type=mujoco.mjtGeom.mjGEOM_CYLINDER, size=[radius, half_z, 0], pos=where, material=material
         )
