@@ -72,7 +72,7 @@ def _clear_distance(scene: Scene, camera: mujoco.MjvCamera, azimuth: float) -> f
     low, high = np.array([0.0, room["y_min"]]) + _MARGIN_M, np.array([room["x_max"], 0.0]) - _MARGIN_M
     back = -np.array([np.cos(azimuth), np.sin(azimuth)]) * np.cos(np.radians(camera.elevation))
     tall = [f for f in scene.fixtures.values() if f.pos[2] - f.height / 2 < _EYE_M < f.pos[2] + f.height / 2]
-    marks = [footprint(f) for f in tall if not f.name.startswith("wall")]
+    marks = [footprint(f) for f in tall if scene.layout.types[f.name] != "wall"]  # wall cabinets are no walls
     clear = _NEAREST_M
     for distance in np.arange(_NEAREST_M, _FARTHEST_M + 1e-6, 0.1):
         x, y = camera.lookat[:2] + distance * back

@@ -9,8 +9,12 @@ import pytest
 from PIL import Image
 
 from robocasa_lerobot.cli import main
+from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.kitchens.footprints import Footprint
+from robocasa_lerobot.envs.scene.roles import footprint
 from robocasa_lerobot.errors import UnknownNameError
 from robocasa_lerobot.gallery.page import write_page
+from robocasa_lerobot.gallery.scene_pictures import visitor_camera
 from robocasa_lerobot.gallery.sections import SECTIONS, Tile, tiles_of, write_sheets
 
 TILES = [
@@ -53,6 +57,19 @@ def test_sections_are_filtered() -> None:
     assert inside.std() > 20, "a plan shows a ceiling instead of the kitchen below"
     with pytest.raises(UnknownNameError, match="layouts"):
         list(tiles_of("layout"))
+
+
+def test_a_visitor_stands_in_no_wall_cabinet() -> None:
+    env = KitchenEnv("StackBowlsInSink", split="target", cameras=())
+    env.reset(seed=132)  # a row of cabinets is where it would stand otherwise
+    camera = visitor_camera(env.scene, env.data)
+    away, down = np.radians([camera.azimuth, camera.elevation])
+    back = camera.distance * np.array([np.cos(away) * np.cos(down), np.sin(away) * np.cos(down), np.sin(down)])
+    x, y, z = camera.lookat - back
+    eye = Footprint(float(x), float(y), 0.0, (0.1, 0.1))
+    for fixture in env.scene.fixtures.values():
+        if abs(z - fixture.pos[2]) < fixture.height / 2:
+            assert not eye.overlaps(footprint(fixture)), fixture.name
 
 
 @pytest.mark.render
