@@ -42,6 +42,7 @@ VIDEO_FPS = CONTROL_HZ
 PHYSICS_TIMESTEP_S = 0.002
 SUBSTEPS = 25  # CONTROL_HZ * SUBSTEPS * PHYSICS_TIMESTEP_S == 1
 IMAGE_SIZE = 256  # pixels, height and width
+LARGEST_IMAGE_SIZE = 4096  # of pictures that are made or read
 
 CAMERAS: tuple[str, ...] = ("robot0_agentview_left", "robot0_agentview_right", "robot0_eye_in_hand")
 STATE_KEY = "observation.state"

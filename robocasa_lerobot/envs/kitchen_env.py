@@ -103,8 +103,7 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         robot: Robot = PANDA_OMRON,
     ) -> None:
         self._declared, self.robot = task if isinstance(task, Task) else get_task(task), robot
-        # Fails here, not at the first reset, for a split without kitchens.
-        chosen = scene_ids(split, layouts=layouts, styles=styles)
+        chosen = scene_ids(split, layouts=layouts, styles=styles)  # fails here, not at the first reset
         without(chosen, self._declared.needs, self._declared.exclude_styles)
         self.layouts = None if layouts is None else list(expand(layouts, "layout"))
         self.styles = None if styles is None else list(expand(styles, "style"))
@@ -113,9 +112,10 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             raise UnknownNameError("render preset", render_preset, RENDER_PRESETS)
         if render_mode not in (None, "rgb_array"):
             raise UnknownNameError("render mode", str(render_mode), ["rgb_array"])
-        if image_size < 1 or (horizon is not None and horizon < 1):
-            name, found = ("image_size", image_size) if image_size < 1 else ("horizon", horizon)
-            raise UserError(f"{name}: found {found}, expected at least 1.")
+        if not 1 <= image_size <= contract.LARGEST_IMAGE_SIZE:
+            raise UserError(f"image_size: found {image_size}, expected 1 to {contract.LARGEST_IMAGE_SIZE}.")
+        if horizon is not None and horizon < 1:
+            raise UserError(f"horizon: found {horizon}, expected at least 1.")
         if render_device is not None:
             gl.check_device(render_device)
         self.task = self._declared.name

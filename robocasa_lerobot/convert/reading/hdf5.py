@@ -17,6 +17,7 @@ from typing import Any
 import h5py
 import numpy as np
 
+from robocasa_lerobot import contract
 from robocasa_lerobot.errors import UserError
 
 # Larger sizes than these are no demonstration's: values of one column, bytes of one text, of one chunk, of one file
@@ -28,7 +29,7 @@ MAX_TEXT_BYTES = 32 << 20
 MAX_CHUNK_BYTES = 1 << 30
 MAX_ASSET_BYTES = 1 << 29
 MAX_RECORDED_BYTES = 1 << 20
-MAX_IMAGE_SIDE = 4096
+MAX_IMAGE_SIDE = contract.LARGEST_IMAGE_SIZE
 LEFT_OUT = "(attributes left out)"
 _MAX_LINKS = 8
 # Errors of a disk or a network file system.
