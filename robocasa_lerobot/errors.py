@@ -37,7 +37,8 @@ class UnknownNameError(UserError):
 
     def __init__(self, kind: str, name: str, known: Iterable[str], remedy: str = "") -> None:
         self.kind, self.name = kind, name
-        super().__init__(f"unknown {kind} {name!r}. {suggest(name, known)}{' ' + remedy if remedy else ''}")
+        # What stands where a name should may be anything, None for example.
+        super().__init__(f"unknown {kind} {name!r}. {suggest(str(name), known)}{' ' + remedy if remedy else ''}")
 
 
 def suggest(name: str, known: Iterable[str]) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from robocasa_lerobot.contract import LARGEST_IMAGE_SIZE
 from robocasa_lerobot.jobs.workers import cores_here
 
 EXAMPLE = (
@@ -127,8 +128,10 @@ def _starts(args: argparse.Namespace) -> None:
         width, height = (int(s) for s in args.overview_size.split("x"))
     except ValueError:
         width = height = 0
-    if width < 1 or height < 1:
-        raise UserError(f"--overview-size {args.overview_size!r}: expected WIDTHxHEIGHT in pixels.")
+    if not (1 <= width <= LARGEST_IMAGE_SIZE and 1 <= height <= LARGEST_IMAGE_SIZE):
+        raise UserError(
+            f"--overview-size {args.overview_size!r}: expected WIDTHxHEIGHT in pixels, {LARGEST_IMAGE_SIZE} at most."
+        )
     for name in names:
         for seed in seeds:
             for path in render_task(

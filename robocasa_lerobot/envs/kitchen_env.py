@@ -25,8 +25,8 @@ from robocasa_lerobot.envs.robots.robot import Controller, Robot
 from robocasa_lerobot.envs.scene.build import RENDER_PRESETS, build_scene
 from robocasa_lerobot.envs.scene.reset_noise import InitialNoise, add_initial_noise
 from robocasa_lerobot.envs.scene.scene import Scene
-from robocasa_lerobot.envs.seeds import checked_seed
-from robocasa_lerobot.envs.state import KitchenState, check_fits, restore
+from robocasa_lerobot.envs.seeds import checked_count, checked_seed
+from robocasa_lerobot.envs.state import KitchenState, check_fits, check_kind, restore
 from robocasa_lerobot.envs.tasks.registry import get_task
 from robocasa_lerobot.envs.tasks.task import BoundTask, Task
 from robocasa_lerobot.errors import UnknownNameError, UserError
@@ -75,7 +75,7 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
 
     Raises:
         UnknownNameError: no such task, split, preset, render mode, camera, camera set, layout or style.
-        UserError: an image size or horizon below 1, a camera twice, or a noise that is none.
+        UserError: an image size or horizon that is no such number, a camera twice, or a noise that is none.
         RenderDeviceError: no such render device.
     """
 
@@ -112,16 +112,14 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             raise UnknownNameError("render preset", render_preset, RENDER_PRESETS)
         if render_mode not in (None, "rgb_array"):
             raise UnknownNameError("render mode", str(render_mode), ["rgb_array"])
-        if not 1 <= image_size <= contract.LARGEST_IMAGE_SIZE:
-            raise UserError(f"image_size: found {image_size}, expected 1 to {contract.LARGEST_IMAGE_SIZE}.")
-        if horizon is not None and horizon < 1:
-            raise UserError(f"horizon: found {horizon}, expected at least 1.")
+        if not isinstance(initial_noise, InitialNoise | None):
+            raise UserError(f"initial_noise: found {initial_noise!r}, expected an InitialNoise(...) or None.")
         if render_device is not None:
             gl.check_device(render_device)
         self.task = self._declared.name
         self.split = split
         self.render_preset = render_preset
-        self.image_size = image_size
+        self.image_size = checked_count("image_size", image_size, contract.LARGEST_IMAGE_SIZE)
         self.cameras = check_camera_names(cameras, robot.cameras(camera_set))
         self.camera_set = camera_set
         if novel_language and not self._declared.paraphrases:
@@ -130,7 +128,7 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self.initial_noise = initial_noise
         self.camera_noise = choose_noise(camera_noise, robot.camera_noise.get(camera_set))
         self._kinds = {"depth": depth, "segmentation": segmentation}
-        self.horizon = horizon if horizon is not None else self._declared.horizon
+        self.horizon = self._declared.horizon if horizon is None else checked_count("horizon", horizon)
         self._max_episode_steps = self.horizon  # where LeRobot looks
         self.terminate_on_success = terminate_on_success
         self.render_mode = render_mode
@@ -240,8 +238,9 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         """Go on from `state`, in its scene; returns the observation and info of that moment.
 
         Raises:
-            UserError: the state is of another task, split, kitchen, MuJoCo version or version of the kitchens.
+            UserError: the state is none, or of another task, split, kitchen, MuJoCo version or version of the kitchens.
         """
+        check_kind(state)
         for what, found, expected in (
             ("task", state.task, self.task),
             ("split", state.split, self.split),

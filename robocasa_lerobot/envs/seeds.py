@@ -1,4 +1,4 @@
-"""Which numbers are seeds of a scene."""
+"""Which numbers are seeds of a scene, and which are counts of something."""
 
 from __future__ import annotations
 
@@ -25,4 +25,17 @@ def checked_seed(value: Any) -> int:
     """
     if not is_seed(value):
         raise UserError(f"seed: found {value!r}, expected {SEEDS}.")
+    return int(value)
+
+
+def checked_count(what: str, value: Any, most: int | None = None) -> int:
+    """A number of pixels or steps, from 1 on, as Python's own.
+
+    Raises:
+        UserError: it is none; `what` is how the message calls it.
+    """
+    whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
+    if not whole or value < 1 or (most is not None and value > most):
+        expected = "of at least 1" if most is None else f"from 1 to {most}"
+        raise UserError(f"{what}: found {value!r}, expected a whole number {expected}.")
     return int(value)

@@ -68,6 +68,19 @@ class KitchenState:
         )
 
 
+def check_kind(state: Any) -> None:
+    """Check that something is a state, and not what one was stored as.
+
+    Raises:
+        UserError: it is something else.
+    """
+    if not isinstance(state, KitchenState):
+        raise UserError(
+            f"kitchen state: found a {type(state).__name__}, expected what `get_state` gave; "
+            "`KitchenState.from_dict` makes one of what `to_dict` stored."
+        )
+
+
 def check_fits(model: mujoco.MjModel, state: KitchenState) -> None:
     """Check that a state has as many numbers as a model.
 

@@ -113,6 +113,10 @@ def test_the_command_makes_sheets_and_a_page_of_sections(tmp_path, capsys) -> No
         (["--show=layouts", "--category=island,galey"], "galley"),
         (["--seeds=-1"], "from 0"),
         (["--show=tasks", "--seeds=-1"], "from 0"),
+        *(
+            (["--overview-size", size], "expected WIDTHxHEIGHT in pixels, 4096 at most")
+            for size in ("10", "0x9", "9x99999")
+        ),
     ],
 )
 def test_what_does_not_apply_is_said_before_any_work(options, words, tmp_path, capsys) -> None:

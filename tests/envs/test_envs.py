@@ -206,6 +206,7 @@ def test_a_fork_after_rendering_without_opengl_draws_the_same(monkeypatch):
     [
         ({"task": "OpenDrawr"}, "OpenDrawer"),
         ({"task": "OpenDrawer", "split": "targt"}, "target"),
+        ({"task": "OpenDrawer", "split": None}, "unknown split None. Known: pretrain, "),
         ({"task": "OpenDrawer", "render_preset": "fst"}, "fast"),
         ({"task": "OpenDrawer", "render_mode": "human"}, "rgb_array"),
     ],
@@ -215,10 +216,24 @@ def test_misspelt_arguments_name_the_closest_match(kwargs, words):
         KitchenEnv(**kwargs)
 
 
+@pytest.mark.parametrize(
+    ("kwargs", "words"),
+    [
+        *(({"image_size": size}, "expected a whole number from 1 to 4096") for size in (0, 64.5, "64", (64, 48), True)),
+        ({"image_size": 100_000}, "expected a whole number from 1 to 4096"),  # no picture would fit into memory
+        *(({"horizon": steps}, "horizon: found .* expected a whole number of at least 1") for steps in (0, 1.5, "9")),
+        *(({"layouts": ids}, "layouts: found .* expected whole numbers") for ids in ("12", "3", [], [1.5], ["1"])),
+        ({"styles": ()}, "styles: found .* expected whole numbers"),
+        ({"initial_noise": 0.1}, r"expected an InitialNoise\(...\)"),
+    ],
+)
+def test_arguments_of_another_kind_say_what_is_expected(kwargs, words):
+    """Instead of a kitchen of layouts 1 and 2 for the text "12", or a failure at the first reset."""
+    with pytest.raises(UserError, match=words):
+        KitchenEnv("OpenDrawer", **kwargs)
+
+
 def test_other_mistakes_say_what_to_do():
-    for size in (0, 100_000):  # of the second one no picture would fit into memory
-        with pytest.raises(UserError, match=f"image_size: found {size}, expected 1 to 4096"):
-            KitchenEnv("OpenDrawer", image_size=size)
     env = KitchenEnv("OpenDrawer", image_size=32)
     with pytest.raises(UserError, match="reset"):
         env.step(np.zeros(12, dtype=np.float32))

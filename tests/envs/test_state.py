@@ -118,6 +118,14 @@ def test_a_reset_with_the_running_seed_is_the_same_scene_again(task: str) -> Non
     assert env.model is not model
 
 
+def test_what_is_no_state_is_refused() -> None:
+    env = make("OpenDrawer")
+    env.reset(seed=0)
+    for other in (None, env.get_state().to_dict()):
+        with pytest.raises(UserError, match=r"expected what `get_state` gave; `KitchenState\.from_dict`"):
+            env.set_state(other)  # type: ignore[arg-type]
+
+
 def test_a_state_of_something_else_is_refused() -> None:
     env = make("OpenDrawer")
     env.reset(seed=0)

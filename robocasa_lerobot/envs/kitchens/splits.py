@@ -70,11 +70,14 @@ def expand(ids: int | Iterable[int], what: str) -> tuple[int, ...]:
 
     Raises:
         UnknownNameError: an id or group that does not exist.
+        UserError: no whole numbers, or none at all.
     """
+    given = [ids] if isinstance(ids, int | np.integer | str) else list(ids)
+    if not given or any(isinstance(i, str) or i != int(i) for i in given):
+        raise UserError(f"{what}s: found {ids!r}, expected whole numbers, such as [1, 12], or -1 for a group of them.")
     known = layout_ids() if what == "layout" else style_ids()
     found: list[int] = []
-    for number in [ids] if isinstance(ids, int | np.integer) else ids:
-        number = int(number)  # NumPy's cannot be written as JSON
+    for number in map(int, given):  # NumPy's cannot be written as JSON
         if number in GROUPS:
             found += GROUPS[number]
         elif number in known:
