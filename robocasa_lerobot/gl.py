@@ -14,6 +14,7 @@ import json
 import os
 import subprocess
 import sys
+import traceback
 import warnings
 from dataclasses import dataclass
 from functools import cache
@@ -297,6 +298,26 @@ def _bound_backend() -> str | None:
     if mujoco is None:
         return None
     return str(getattr(getattr(mujoco, "GLContext", None), "__module__", "")).rpartition(".")[2]
+
+
+def failed_backend(error: BaseException) -> NoOpenGLError | None:
+    """What is to be done where an error is of the backend that `MUJOCO_GL` names; None where it is of anything else.
+
+    MuJoCo loads that backend when it is imported, and leaves what is wrong with it to whichever line fails first.
+    """
+    asked = os.environ.get(VARIABLE)
+    files = [Path(frame.f_code.co_filename) for frame, _ in traceback.walk_tb(error.__traceback__)]
+    if not asked or not any("OpenGL" in file.parts or file.name == "gl_context.py" for file in files):
+        return None
+    return no_context(error)
+
+
+def no_context(error: BaseException) -> NoOpenGLError:
+    """An error that says what to do where there is no OpenGL context."""
+    asked = os.environ.get(VARIABLE)
+    named = f" of {VARIABLE}={asked}" if asked else ""
+    remedy = f"Unset {VARIABLE}: what works is found without it" if asked else f"Install one: {REMEDY} "
+    return NoOpenGLError(f"no OpenGL context{named} ({error}). {remedy} (`robocasa-lerobot doctor` checks it).")
 
 
 def note_renderer() -> str:

@@ -15,6 +15,7 @@ from types import ModuleType
 
 from robocasa_lerobot import __version__
 from robocasa_lerobot.errors import UserError, suggest
+from robocasa_lerobot.gl import failed_backend
 from robocasa_lerobot.jobs.importing import rare_collections
 from robocasa_lerobot.jobs.workers import check_workers
 
@@ -209,6 +210,11 @@ def main(argv: Sequence[str] | None = None, own_process: bool | None = None) -> 
         if error.errno not in _FULL:
             raise
         print(f"robocasa-lerobot {name}: {error}. Free disk space, and give the command again.", file=sys.stderr)
+        return 2
+    except Exception as error:
+        if (failed := failed_backend(error)) is None:
+            raise
+        print(f"robocasa-lerobot {name}: {failed}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         print(f"\nrobocasa-lerobot {name}: interrupted", file=sys.stderr)

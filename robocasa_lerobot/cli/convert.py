@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import shlex
 from pathlib import Path
 
 from robocasa_lerobot.cli.options import add_source_options, import_lerobot_leanly, source_settings
@@ -102,5 +103,5 @@ def run(args: argparse.Namespace) -> int:
         print(f"{len(result.rejected)} episodes rejected (all in meta/robocasa/rejected.jsonl):")
         for line in result.rejected[:_SHOWN_REJECTIONS]:
             print(f"  {line['source_file']} {line['source_demo']}: {line['reason']}")
-    print(f"check it: robocasa-lerobot verify {args.out}")
+    print(f"check it: robocasa-lerobot verify {shlex.quote(str(args.out))}")
     return 0

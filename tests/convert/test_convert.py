@@ -318,8 +318,9 @@ def test_files_that_do_not_fit_together(tmp_path: Path) -> None:
 
 def test_existing_output_is_replaced_only_when_asked(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     source = write_demos(tmp_path / "a.hdf5", (5,), images=16)
-    out = tmp_path / "out"
+    out = tmp_path / "out again"
     assert cli.main(["convert", str(source), "--out", str(out)]) == 0
+    assert f"check it: robocasa-lerobot verify '{out}'" in capsys.readouterr().out  # can be typed as it is
     before = tree_hashes(out)
     assert cli.main(["convert", str(source), "--out", str(out)]) == 2
     assert "--overwrite" in capsys.readouterr().err
@@ -334,7 +335,7 @@ def test_existing_output_is_replaced_only_when_asked(tmp_path: Path, capsys: pyt
     shutil.rmtree(out / "by_hand")
     assert cli.main(["convert", str(source), "--out", str(out), "--overwrite"]) == 0
     assert len(column(out, "index")) == 7
-    assert leftovers(out) == ["out"]
+    assert leftovers(out) == ["out again"]
     other = tmp_path / "notes"
     other.mkdir()
     (other / "thesis.txt").write_text("years of work")

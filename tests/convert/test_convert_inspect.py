@@ -159,9 +159,10 @@ def test_files_without_demonstrations(tmp_path: Path, capsys: pytest.CaptureFixt
 
 
 def test_drafts_replace_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    path, draft = write_libero(tmp_path / "a.hdf5"), tmp_path / "draft.yaml"
+    path, draft = write_libero(tmp_path / "a file.hdf5"), tmp_path / "draft.yaml"
     command = ["inspect", str(path), "--draft-mapping", str(draft)]
     assert cli.main(command) == 0
+    assert f"robocasa-lerobot convert '{path}' --mapping ..." in capsys.readouterr().out  # can be typed as it is
     written = draft.read_bytes()
     assert cli.main(command) == 2
     assert "exists already" in capsys.readouterr().err

@@ -8,6 +8,7 @@ import sys
 import types
 from contextlib import closing
 from functools import partial
+from pathlib import Path
 
 import mujoco
 import pytest
@@ -107,6 +108,22 @@ with mujoco.Renderer(mujoco.MjModel.from_xml_string("<mujoco/>"), 8, 8) as rende
     command = [sys.executable, "-c", code, os.environ[gl.VARIABLE]]
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere windows need no display")
+@pytest.mark.parametrize("backend", ["glfw", "nonsense"])
+def test_a_backend_that_does_not_work_here_is_told_with_what_to_do(backend: str, tmp_path: Path) -> None:
+    """One for windows without a display fails where something is drawn, one that MuJoCo does not know at its import."""
+    asked = ["--tasks=OpenDrawer", "--image-size=16", "--overview-size=16x16", f"--out={tmp_path / 'pictures'}"]
+    environment = {name: value for name, value in os.environ.items() if name not in ("DISPLAY", "WAYLAND_DISPLAY")}
+    environment |= {gl.VARIABLE: backend, gl.RENDERER_VARIABLE: "opengl"}
+    environment.pop("PYOPENGL_PLATFORM", None)
+    command = [sys.executable, "-m", "robocasa_lerobot.cli", "gallery", *asked]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 2, done.stderr
+    assert f"robocasa-lerobot gallery: no OpenGL context of MUJOCO_GL={backend} (" in done.stderr
+    assert "Unset MUJOCO_GL: what works is found without it" in done.stderr
+    assert "Traceback" not in done.stderr
 
 
 @pytest.mark.render

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import shlex
 from pathlib import Path
 
 from robocasa_lerobot.errors import UserError
@@ -55,5 +56,6 @@ def run(args: argparse.Namespace) -> int:
     if args.report == "json":
         print(json.dumps(found, indent=2, ensure_ascii=False, default=str))
     elif args.draft_mapping is not None:
-        print(f"draft: {args.draft_mapping}; check it, then: robocasa-lerobot convert {args.paths[0]} --mapping ...")
+        file = shlex.quote(str(args.paths[0]))
+        print(f"draft: {args.draft_mapping}; check it, then: robocasa-lerobot convert {file} --mapping ...")
     return 0

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from robocasa_lerobot.envs.rendering.frustum import clipping_planes, distances, in_view
 from robocasa_lerobot.errors import UserError
-from robocasa_lerobot.gl import ensure_gl, note_renderer
+from robocasa_lerobot.gl import ensure_gl, no_context, note_renderer
 
 # robosuite's and RoboCasa's convention: group 0 holds collision shapes, group 1 what cameras see.
 COLLISION_GROUP = 0
@@ -275,7 +275,10 @@ class _Surface:
 
 
 def _context_of(model: mujoco.MjModel) -> mujoco.MjrContext:
-    context = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100.value)
+    try:
+        context = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100.value)
+    except mujoco.FatalError as error:  # of a backend for windows, where there is no display
+        raise no_context(error) from error
     context.readDepthMap = mujoco.mjtDepthMap.mjDEPTH_ZEROFAR
     return context
 
