@@ -208,7 +208,9 @@ def check_plugins(run: Callable[[], subprocess.CompletedProcess[str]] | None = N
     if missing:
         lines = [line.strip() for line in done.stderr.splitlines() if "robocasa" in line.lower() or "Error" in line]
         found = f"LeRobot does not find {', '.join(missing)}" + (f": {lines[-1]}" if lines else "")
-        return Finding("plugins", "fault", found, "make setup")
+        asked = os.environ.get(gl.VARIABLE)
+        unset = asked and gl.probe(asked).renderer is None  # MuJoCo does not import, and so neither do our plugins
+        return Finding("plugins", "fault", found, f"unset {gl.VARIABLE}" if unset else "make setup")
     return Finding("plugins", "ok", f"LeRobot finds {', '.join(OUR_TYPES)}")
 
 

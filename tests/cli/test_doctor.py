@@ -138,6 +138,13 @@ def test_plugin_failure_shows_its_reason() -> None:
     assert "ImportError: no module x" in doctor.check_plugins(lambda: done).found
 
 
+def test_plugins_that_a_backend_keeps_from_importing_are_no_matter_of_the_setup(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv(gl.VARIABLE, "nonsense")  # with which MuJoCo ends its own import
+    assert doctor.check_plugins(lambda: discovery("types: aloha act")).remedy == "unset MUJOCO_GL"
+
+
 def test_a_check_that_breaks_is_a_fault_and_not_a_crash() -> None:
     def check_something() -> Finding:
         raise ImportError("No module named 'torch'")
