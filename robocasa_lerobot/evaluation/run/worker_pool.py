@@ -165,7 +165,8 @@ class WorkerPool:
                 limit = max(limit, LOADING_SECONDS)
             if (slot.attempt is not None or not slot.ready) and now - slot.last_sign > limit:
                 slot.process.kill()
-                cause = f"no progress for {limit:g} s; the worker was killed (a slow machine needs more `stall_seconds`)"
+                remedy = "a slow machine needs more `stall_seconds`"
+                cause = f"no progress for {limit:g} s; the worker was killed ({remedy})"
                 yield from self._bury(slot, cause, HUNG)
 
     def _bury(self, slot: _Slot, cause: str, kind: str) -> Iterator[Completed]:
