@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping
 
 import mujoco
@@ -10,10 +11,14 @@ from numpy.typing import NDArray
 
 from robocasa_lerobot.envs.kitchens.appliances.base import Appliance
 from robocasa_lerobot.envs.kitchens.appliances.catalogue import build_appliance
+from robocasa_lerobot.envs.kitchens.appliances.parts import HIDDEN_M
 from robocasa_lerobot.envs.kitchens.materials import MaterialPalette, load_style
 from robocasa_lerobot.envs.rendering import SceneRenderer
+from robocasa_lerobot.envs.rendering.canvas import COLLISION_GROUP
 
 _AZIMUTH, _ELEVATION = 116.0, -24.0  # degrees
+_FOVY = 45.0  # of MuJoCo's free camera, degrees
+_FILLED = 0.92  # of the picture, by the appliance in all its states
 
 
 def appliance_pictures(
@@ -33,13 +38,11 @@ def appliance_pictures(
     data = mujoco.MjData(model)
     renderer = SceneRenderer(model, size, size)
     pictures = {}
+    shown = appliance.looks if states is None else states
     try:
-        for name, shares in (appliance.looks if states is None else states).items():
-            mujoco.mj_resetData(model, data)
-            for part, share in shares.items():
-                appliance.set_share(data, part, share)
-            mujoco.mj_forward(model, data)
-            pictures[name] = renderer.render(data, _camera(appliance))
+        camera = _camera(np.concatenate([_corners(_put(appliance, model, data, shares)) for shares in shown.values()]))
+        for name, shares in shown.items():
+            pictures[name] = renderer.render(_put(appliance, model, data, shares), camera)
     finally:
         renderer.close()
     return pictures
@@ -70,10 +73,41 @@ def stand_alone(model_id: str) -> tuple[Appliance, mujoco.MjModel]:
     return appliance, spec.compile()
 
 
-def _camera(appliance: Appliance) -> mujoco.MjvCamera:
+def _put(
+    appliance: Appliance, model: mujoco.MjModel, data: mujoco.MjData, shares: Mapping[str, float]
+) -> mujoco.MjData:
+    """The state in which parts are at these shares of their range."""
+    mujoco.mj_resetData(model, data)
+    for part, share in shares.items():
+        appliance.set_share(data, part, share)
+    mujoco.mj_forward(model, data)
+    return data
+
+
+def _corners(data: mujoco.MjData) -> NDArray[np.float64]:
+    """The corners (N, 3) of the boxes around all geoms that can be seen, m, world."""
+    model = data.model
+    seen = (model.geom_group != COLLISION_GROUP) & (model.geom_rgba[:, 3] > 0)
+    seen &= data.geom_xpos[:, 2] > -HIDDEN_M / 2  # but for water that does not run
+    center, half = np.split(model.geom_aabb[seen].reshape(-1, 1, 6), 2, axis=-1)
+    own = center + half * np.array(list(itertools.product((-1, 1), repeat=3)))
+    turned = own @ data.geom_xmat[seen].reshape(-1, 3, 3).transpose(0, 2, 1)
+    corners: NDArray[np.float64] = (turned + data.geom_xpos[seen][:, None]).reshape(-1, 3)
+    return corners
+
+
+def _camera(points: NDArray[np.float64]) -> mujoco.MjvCamera:
+    """As near as lets all points be seen: the same for all states, with doors and lids where they open to."""
+    azimuth, elevation = np.radians(_AZIMUTH), np.radians(_ELEVATION)
+    level = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
+    ahead = np.cos(elevation) * level + np.array([0.0, 0.0, np.sin(elevation)])
+    right = np.array([level[1], -level[0], 0.0])
+    axes = np.array([right, np.cross(right, ahead), ahead])
+    seen = points @ axes.T
+    middle = (seen.min(axis=0) + seen.max(axis=0)) / 2
+    sideways, deep = np.abs(seen - middle)[:, :2].max(axis=1), (seen - middle)[:, 2]
     camera = mujoco.MjvCamera()
-    extent = float(np.linalg.norm(appliance.size))
-    camera.lookat = [0.0, -0.1 * extent, 0.0]
-    camera.distance = 1.6 * extent
+    camera.lookat = middle @ axes
+    camera.distance = float((sideways / (_FILLED * np.tan(np.radians(_FOVY) / 2)) - deep).max())
     camera.azimuth, camera.elevation = _AZIMUTH, _ELEVATION
     return camera

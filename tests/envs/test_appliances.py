@@ -220,3 +220,15 @@ def test_states_can_be_seen(kind):
     assert first.std() > 5
     for name, other in zip(list(pictures)[1:], others, strict=True):
         assert (np.abs(first - other).max(axis=-1) > 30).sum() >= 4, name
+
+
+@pytest.mark.render
+@pytest.mark.parametrize("kind", kinds())
+def test_no_state_is_cut_off_at_the_edge_of_its_picture(kind):
+    pictures = np.array([*appliance_pictures(models_of(kind)[-1].model_id, size=96).values()], dtype=int)
+    background = np.median(pictures[:, :, [0, -1]], axis=(0, 2))  # of each row, from both sides
+    there = np.abs(pictures - background[None, :, None]).max(axis=-1) > 40
+    edges = [there[:, [0, -1]], there[:, :, [0, -1]]]
+    assert not any(edge.any() for edge in edges)
+    columns, rows = np.nonzero(there.any(axis=(0, 1)))[0], np.nonzero(there.any(axis=(0, 2)))[0]
+    assert max(np.ptp(columns), np.ptp(rows)) > 96 / 2  # nor is the camera far away
