@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,7 +23,7 @@ from robocasa_lerobot.gallery.object_pictures import object_tiles
 SPLITS = ("pretrain", "target")
 _SHOWN_IN = {"target": 2, "pretrain": 12}  # the layout that a style is shown in: an L with an island
 _OBJECTS_AT_ONCE = 24
-_CAPTION_PX = 16
+_LETTER_PX, _LINE_PX = 6, 12  # of captions: about, and at most
 
 
 @dataclass(frozen=True)
@@ -140,13 +141,16 @@ def write_sheets(section: str, tiles: list[Tile], out: Path, rows: int = 6) -> l
     for sheet, start in enumerate(range(0, len(tiles), columns * rows)):
         chosen = tiles[start : start + columns * rows]
         width = max(tile.picture.shape[1] for tile in chosen)
-        height = max(tile.picture.shape[0] for tile in chosen) + _CAPTION_PX
+        captions = [textwrap.wrap(tile.title, width // _LETTER_PX - 1) for tile in chosen]
+        below = max(tile.picture.shape[0] for tile in chosen)
+        height = below + _LINE_PX * max(map(len, captions)) + 4
         picture = Image.new("RGB", (columns * width, -(-len(chosen) // columns) * height), (250, 250, 250))
         draw = ImageDraw.Draw(picture)
-        for index, tile in enumerate(chosen):
+        for index, (tile, lines) in enumerate(zip(chosen, captions, strict=True)):
             x, y = index % columns * width, index // columns * height
             picture.paste(Image.fromarray(tile.picture), (x, y))
-            draw.text((x + 4, y + height - _CAPTION_PX + 2), tile.title[: width // 6], fill=(20, 20, 20))
+            for number, line in enumerate(lines):
+                draw.text((x + 4, y + below + 2 + number * _LINE_PX), line, fill=(20, 20, 20))
         paths.append(out / f"{section}_{sheet}.png")
         picture.save(paths[-1])
     return paths

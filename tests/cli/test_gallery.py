@@ -42,7 +42,14 @@ def test_contact_sheets_hold_all_pictures(tmp_path) -> None:
     columns = SECTIONS["appliances"][2]
     paths = write_sheets("appliances", TILES, tmp_path, rows=1)
     assert len(paths) == -(-len(TILES) // columns)
-    assert Image.open(paths[0]).size == (30 * columns, 20 + 16)
+    assert Image.open(paths[0]).size == (30 * columns, 20 + 16 + 12)  # "thing", and its number below
+
+
+def test_a_long_caption_stands_whole_below_its_picture(tmp_path) -> None:
+    tiles = [Tile(title, "round", "target", np.full((20, 90, 3), 250, np.uint8)) for title in ("ox", "x" * 30)]
+    short, long = np.split(np.asarray(Image.open(*write_sheets("appliances", tiles, tmp_path))), [90], axis=1)
+    written = [np.nonzero((sheet[20:] < 128).any(axis=(1, 2)))[0] for sheet in (short, long)]
+    assert np.ptp(written[0]) < 12 < 24 < np.ptp(written[1])  # one line, and three
 
 
 @pytest.mark.render
