@@ -83,8 +83,12 @@ class Page:
     def click(self, selector: str) -> None:
         """With the mouse, in the middle of an element."""
         left, top, width, height = self.browser.box(selector)
+        self.click_at(left + width / 2, top + height / 2)
+
+    def click_at(self, x: float, y: float) -> None:
+        """With the mouse, CSS pixels of the window."""
         for kind in ("mousePressed", "mouseReleased"):
-            self.browser.mouse(kind, left + width / 2, top + height / 2)
+            self.browser.mouse(kind, x, y)
 
     def until(self, phase: str) -> None:
         """Wait for a phase; for time to run also where a picture is late meanwhile."""
@@ -115,6 +119,19 @@ class Page:
                     time.sleep(0.01)
             finally:
                 end()
+
+    def answer(self, x: float, y: float, expression: str) -> Any:
+        """Click until a JavaScript expression is true; its value."""
+        deadline = time.monotonic() + WAIT_S
+        while True:
+            self.go_on()
+            self.click_at(x, y)
+            again = time.monotonic() + AGAIN_S
+            while time.monotonic() < again:
+                if value := self.browser.ask(expression):
+                    return value
+                time.sleep(0.05)
+            assert time.monotonic() < deadline, f"no answer to a click: {self.told()}"
 
     def wait(self, shows: Callable[[], object]) -> None:
         """Wait until something shows; where time stands since a picture was late, it is run again."""

@@ -178,7 +178,8 @@ function watch() {
   $("dot").dataset.state = !state.line ? "off" : age || stale ? "late" : "on";
   const offered = !$("veil-button").hidden;
   panel.veil(state.head, { age, line: state.line });
-  if (offered && $("veil-button").hidden) tiles.quiet(); // whoever clicks it twice hits the picture behind it
+  // Whoever clicks it twice hits the picture behind it.
+  if (offered && $("veil-button").hidden && state.head?.phase === "running") tiles.quiet();
 }
 
 function lostFocus() {
