@@ -117,8 +117,12 @@ SENTENCES: list[tuple[str, str, list[str]]] = [
         ["ratios/demo, with films", "ratios/demo, without films"],
     ),
     (r"([\d,]+) of ([\d,]+) trials", "demonstrators_300.json", ["tasks/*/successes", "trials"]),
-    (r"CloseCabinet, in (\d+) of 40", "demonstrators.json", ["tasks/CloseCabinet/successes"]),
-    (r"CloseBlenderLid and CloseCabinet, in (\d+)", "demonstrators.json", ["tasks/CloseBlenderLid/successes"]),
+    (
+        r"of the first (\d+) of them, made again on .{,20}, \[(\d+) succeeded",
+        "demonstrators_300_again.json",
+        ["trials", "tasks/*/successes"],
+    ),
+    (r"CloseBlenderLid, in (\d+) of 40", "demonstrators.json", ["tasks/CloseBlenderLid/successes"]),
     (r"took \[(\d+) minutes", "every_task.json", ["minutes/*"]),
 ]
 
