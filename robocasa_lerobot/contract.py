@@ -48,6 +48,7 @@ CAMERAS: tuple[str, ...] = ("robot0_agentview_left", "robot0_agentview_right", "
 STATE_KEY = "observation.state"
 ACTION_KEY = "action"
 TASK_KEY = "task"
+INSTRUCTION_KEY = "annotation.human.task_description"  # of RoboCasa's datasets, its envs, and GR00T
 IMAGE_PREFIX = "observation.images."
 # Which stage a frame belongs to: its number in the episode, its row in the table of texts, and LeRobot's own column.
 STAGE_KEY = "stage_index"

@@ -21,7 +21,6 @@ from robocasa_lerobot.errors import UserError
 
 NAMESPACE = "robocasa"
 VIDEO, STATE, ACTION = "video.", "state.", "action."
-INSTRUCTION = "annotation.human.task_description"
 _LONGEST_INSTRUCTION = 256  # characters
 _CHARACTERS = string.ascii_letters + string.digits + string.punctuation + " \n"
 
@@ -74,7 +73,7 @@ class RoboCasaGym(gymnasium.Wrapper[Parts, Mapping[str, ArrayLike], dict[str, An
             {
                 **{VIDEO + camera: box(0, 255, shape, np.uint8) for camera in cameras},
                 **{STATE + p.name: box(-np.inf, np.inf, (p.size,), np.float32) for p in contract.STATE_PARTS},
-                INSTRUCTION: gymnasium.spaces.Text(_LONGEST_INSTRUCTION, charset=_CHARACTERS),
+                contract.INSTRUCTION_KEY: gymnasium.spaces.Text(_LONGEST_INSTRUCTION, charset=_CHARACTERS),
             }
         )
         self.action_space = gymnasium.spaces.Dict(
@@ -104,7 +103,7 @@ class RoboCasaGym(gymnasium.Wrapper[Parts, Mapping[str, ArrayLike], dict[str, An
         return {
             **{VIDEO + camera: picture for camera, picture in pictures.items()},
             **{STATE + name: part for name, part in state.items()},
-            INSTRUCTION: self._kitchen.task_description,
+            contract.INSTRUCTION_KEY: self._kitchen.task_description,
         }
 
 

@@ -17,7 +17,6 @@ from robocasa_lerobot.envs.rendering import SceneRenderer
 from robocasa_lerobot.envs.rendering.canvas import COLLISION_GROUP
 
 _AZIMUTH, _ELEVATION = 116.0, -24.0  # degrees
-_FOVY = 45.0  # of MuJoCo's free camera, degrees
 _FILLED = 0.92  # of the picture, by the appliance in all its states
 
 
@@ -40,7 +39,8 @@ def appliance_pictures(
     pictures = {}
     shown = appliance.looks if states is None else states
     try:
-        camera = _camera(np.concatenate([_corners(_put(appliance, model, data, shares)) for shares in shown.values()]))
+        corners = [_corners(_put(appliance, model, data, shares)) for shares in shown.values()]
+        camera = _camera(np.concatenate(corners), np.radians(model.vis.global_.fovy))
         for name, shares in shown.items():
             pictures[name] = renderer.render(_put(appliance, model, data, shares), camera)
     finally:
@@ -96,8 +96,8 @@ def _corners(data: mujoco.MjData) -> NDArray[np.float64]:
     return corners
 
 
-def _camera(points: NDArray[np.float64]) -> mujoco.MjvCamera:
-    """As near as lets all points be seen: the same for all states, with doors and lids where they open to."""
+def _camera(points: NDArray[np.float64], fovy: float) -> mujoco.MjvCamera:
+    """As near as lets all points be seen: the same for all states, with doors and lids where they open to; radians."""
     azimuth, elevation = np.radians(_AZIMUTH), np.radians(_ELEVATION)
     level = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
     ahead = np.cos(elevation) * level + np.array([0.0, 0.0, np.sin(elevation)])
@@ -108,6 +108,6 @@ def _camera(points: NDArray[np.float64]) -> mujoco.MjvCamera:
     sideways, deep = np.abs(seen - middle)[:, :2].max(axis=1), (seen - middle)[:, 2]
     camera = mujoco.MjvCamera()
     camera.lookat = middle @ axes
-    camera.distance = float((sideways / (_FILLED * np.tan(np.radians(_FOVY) / 2)) - deep).max())
+    camera.distance = float((sideways / (_FILLED * np.tan(fovy / 2)) - deep).max())
     camera.azimuth, camera.elevation = _AZIMUTH, _ELEVATION
     return camera

@@ -15,7 +15,6 @@ from robocasa_lerobot.serving.observations import flatten
 from robocasa_lerobot.serving.policy import Served
 from robocasa_lerobot.serving.request import RequestError
 
-LANGUAGE_KEY = "annotation.human.task_description"
 _UNBATCHED = {"video": 4, "state": 2}  # axes of an array (T, ...) without a batch
 
 
@@ -71,7 +70,7 @@ def modality_config(served: Served, version: str) -> dict[str, Any]:
         "video": (history, served.cameras),
         "state": (history, [part.name for part in contract.STATE_PARTS]),
         "action": (list(range(served.executed)), [part.name for part in contract.ACTION_PARTS]),
-        "language": ([0], [LANGUAGE_KEY]),
+        "language": ([0], [contract.INSTRUCTION_KEY]),
     }
     out: dict[str, Any] = {}
     for modality, (offsets, names) in keys.items():

@@ -54,8 +54,8 @@ _OPENPI_STATE_PARTS: Final = (
 )
 _INSTRUCTIONS: Final = (
     *("prompt", contract.TASK_KEY, "task_description", "instruction"),
-    *("annotation.human.task_description", "annotation.human.action.task_description"),
-    *("language.annotation.human.task_description", "language.annotation.human.action.task_description"),
+    *(contract.INSTRUCTION_KEY, "annotation.human.action.task_description"),
+    *(f"language.{contract.INSTRUCTION_KEY}", "language.annotation.human.action.task_description"),
 )
 _MAX_INSTRUCTION: Final = 4096  # characters
 

@@ -105,33 +105,25 @@ class Page:
         last = len(episode) + count
         self.wait(lambda: len(episode) >= last)
 
-    def gesture(self, begin: Callable[[], object], end: Callable[[], object], shows: Callable[[], object]) -> None:
-        """Begin something and go on with it until it shows, however long commands take on this machine; then end it."""
+    def gesture(self, begin: Callable[[], object], end: Callable[[], object], shows: Callable[[], Any]) -> Any:
+        """Begin something and go on until it shows, however long commands take here; then end it. What it showed."""
         deadline = time.monotonic() + WAIT_S
-        shown = False
+        shown = None
         while not shown:
             assert time.monotonic() < deadline, f"nothing to be seen of it: {self.told()}"
             self.go_on()
             begin()
             try:
                 again = time.monotonic() + AGAIN_S
-                while not (shown := bool(shows())) and time.monotonic() < again and not self.late:
+                while not (shown := shows()) and time.monotonic() < again and not self.late:
                     time.sleep(0.01)
             finally:
                 end()
+        return shown
 
     def answer(self, x: float, y: float, expression: str) -> Any:
         """Click until a JavaScript expression is true; its value."""
-        deadline = time.monotonic() + WAIT_S
-        while True:
-            self.go_on()
-            self.click_at(x, y)
-            again = time.monotonic() + AGAIN_S
-            while time.monotonic() < again:
-                if value := self.browser.ask(expression):
-                    return value
-                time.sleep(0.05)
-            assert time.monotonic() < deadline, f"no answer to a click: {self.told()}"
+        return self.gesture(lambda: self.click_at(x, y), lambda: None, lambda: self.browser.ask(expression))
 
     def wait(self, shows: Callable[[], object]) -> None:
         """Wait until something shows; where time stands since a picture was late, it is run again."""

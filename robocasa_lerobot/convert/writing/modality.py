@@ -16,7 +16,6 @@ from robocasa_lerobot.contract import Part
 
 MODALITY_FILE = "meta/modality.json"
 INSTRUCTION = "human.task_description"
-_INSTRUCTION_COLUMN = "annotation.human.task_description"  # of RoboCasa's datasets; LeRobot's own column otherwise
 
 
 def modality(
@@ -35,7 +34,8 @@ def modality(
                 name: {"original_key": key, "start": where.start, "end": where.stop} for name, where in known.items()
             }
     cameras = [key for key, feature in features.items() if contract.is_picture(feature)]
-    column = _INSTRUCTION_COLUMN if _INSTRUCTION_COLUMN in features else "task_index"
+    # RoboCasa's datasets have a column of their own.
+    column = contract.INSTRUCTION_KEY if contract.INSTRUCTION_KEY in features else "task_index"
     return vectors | {
         "video": {key.removeprefix(contract.IMAGE_PREFIX): {"original_key": key} for key in cameras},
         "annotation": {INSTRUCTION: {"original_key": column}},

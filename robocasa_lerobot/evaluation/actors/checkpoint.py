@@ -152,9 +152,10 @@ def label_of(path: str) -> str | None:
         return path
     if path.startswith(f"{REPLAY}:"):
         return REPLAY
-    if what_lacks(path) is not None:
+    try:
+        folder = find_pretrained(Path(path)).resolve()
+    except CheckpointError:
         return None
-    folder = find_pretrained(Path(path)).resolve()
     return default_label(read_origin(folder), folder)
 
 

@@ -136,11 +136,12 @@ export class Panel {
     else if (head.phase === "ready") [title, words] = ["Ready", head.policy ? "Start the policy, or move the robot yourself." : ready(matchMedia("(pointer: coarse)").matches)];
     else if (head.phase === "rewinding") [title, words] = ["Going back", "Let go to go on from here."];
     // While pictures are still late, time would stop again at once.
-    const waits = head?.phase === "paused" && head.pause === "stale" && head.late;
+    const stale = head?.phase === "paused" && head.pause === "stale";
+    const waits = stale && head.late;
     if (waits) words = "The robot stands. You can go on as soon as they come in time.";
     show($("veil"), Boolean(title));
     $("veil").classList.toggle("light", ["ready", "paused", "rewinding"].includes(head?.phase) && line && !age);
-    $("veil").classList.toggle("warning", Boolean(age) || (head?.phase === "paused" && head.pause === "stale"));
+    $("veil").classList.toggle("warning", Boolean(age) || stale);
     text($("veil-title"), title);
     text($("veil-text"), words);
     show($("veil-button"), Boolean(button) && head.mine && !waits);
